@@ -1,0 +1,1 @@
+"""Numerical kernels of the finite-element operators: arrays in, arrays out, no language inside."""
