@@ -1,0 +1,56 @@
+# make demo    the adaptive contact study of examples/adaptation, pictures included
+# make test    the test suite (slow and bench tests are left out)
+# make check   format, lint, types, layers, generated documents
+# make bench   time and memory of a few scenes
+# make clean   remove what the others made
+#
+# Needs Python >= 3.11 and make. Everything else goes into .venv inside this folder.
+# Another Python: make test PYTHON=/path/to/python3
+
+VENV := .venv
+BIN := $(VENV)/bin
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+DEMO := examples/adaptation
+
+.PHONY: demo test check bench clean venv venv-dev
+.DEFAULT_GOAL := demo
+
+$(BIN)/python:
+	@sh .ci/venv.sh $(VENV)
+
+# The stamps are redone when pyproject.toml changes; the install is editable, so new source files are seen at once.
+$(VENV)/installed: pyproject.toml | $(BIN)/python
+	@echo "gibiane: installing into $(VENV)"
+	@$(BIN)/python -m pip install --quiet --editable ".[viz,test]"
+	@touch $@
+
+$(VENV)/installed-dev: pyproject.toml | $(VENV)/installed
+	@echo "gibiane: installing the development tools into $(VENV)"
+	@$(BIN)/python -m pip install --quiet --editable ".[viz,test,dev]"
+	@touch $@ $(VENV)/installed
+
+venv: $(VENV)/installed
+venv-dev: $(VENV)/installed-dev
+
+demo: venv
+	$(BIN)/gibiane $(DEMO)/scene.dgibi
+	@echo
+	@echo "Pictures and files of this run: $(DEMO)/results"
+	@ls $(DEMO)/results
+
+test: venv
+	$(BIN)/python -m pytest
+
+check: venv-dev
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/gibiane docs --check
+
+bench: venv
+	$(BIN)/python -m pytest -m bench -s
+
+clean:
+	rm -rf $(VENV) build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache examples/*/results
+	find interpreter ops tests -name __pycache__ -type d -prune -exec rm -rf {} +
