@@ -1,0 +1,131 @@
+"""Factorise and solve: every package gives the answer, a singular matrix is named, a wrong package is replaced."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from gibiane_ops.kernels import solve
+from gibiane_ops.kernels.errors import BadValue, SingularSystem
+from gibiane_ops.kernels.solve import factorize
+
+
+def chain(n, stiffness=1.0, held=True):
+    """Springs in a row; the end spring to the ground may be left out."""
+    main = np.full(n, 2.0)
+    main[-1] = 1.0
+    if not held:
+        main[0] = 1.0
+    return stiffness * sp.diags([np.full(n - 1, -1.0), main, np.full(n - 1, -1.0)], [-1, 0, 1], format="csr")
+
+
+def laplacian3(n):
+    one = sp.diags([np.full(n - 1, -1.0), np.full(n, 2.0), np.full(n - 1, -1.0)], [-1, 0, 1])
+    eye = sp.identity(n)
+    plane = sp.kron(one, eye) + sp.kron(eye, one)
+    return sp.csr_matrix(sp.kron(plane, eye) + sp.kron(sp.identity(n * n), one))
+
+
+@pytest.mark.parametrize("method", ["auto", "rslab", "superlu", "amg"])
+@pytest.mark.parametrize("shape", [(343,), (343, 1), (343, 70)])
+def test_solves_one_and_several_right_hand_sides(method, shape):
+    A = laplacian3(7)
+    x = np.random.default_rng(1).standard_normal(shape)
+    factor = factorize(A, method=method)
+    found = factor.solve(A @ x)
+    assert found.shape == shape
+    np.testing.assert_allclose(found, x, rtol=0, atol=1e-9)
+    assert factor.residual < solve.RESIDUAL_LIMIT
+    assert factor.notes == ()
+
+
+def test_chain_of_springs_pulled_at_its_end():
+    np.testing.assert_allclose(factorize(chain(6, 3.0)).solve(np.r_[np.zeros(5), 1.0]), np.arange(1, 7) / 3, rtol=1e-13)
+
+
+@pytest.mark.parametrize("method", ["auto", "superlu", "amg"])
+@pytest.mark.parametrize("stiffness", [1e-9, 1.0, 1e12])
+def test_free_chain_is_singular_whatever_the_units(method, stiffness):
+    with pytest.raises(SingularSystem) as caught:
+        factorize(chain(50, stiffness, held=False), method=method).solve(np.r_[np.zeros(49), 1.0])
+    assert len(caught.value.unknowns) == 50
+
+
+def test_the_loose_part_is_named():
+    A = sp.block_diag([chain(30), chain(20, 7.0, held=False)], format="csr")
+    with pytest.raises(SingularSystem) as caught:
+        factorize(A)
+    np.testing.assert_array_equal(caught.value.unknowns, np.arange(30, 50))
+
+
+def test_unknown_without_stiffness_is_named():
+    A = chain(5).tolil()
+    A[3, :] = 0
+    A[:, 3] = 0
+    with pytest.raises(SingularSystem) as caught:
+        factorize(A)
+    np.testing.assert_array_equal(caught.value.unknowns, [3])
+
+
+def test_stiff_but_regular_system_is_accepted():
+    # a penalty spring 1e8 times stiffer than the rest: ill conditioned, yet it has one answer
+    A = chain(40).tolil()
+    A[9:11, 9:11] += 1e8 * np.array([[1, -1], [-1, 1]])
+    x = factorize(A).solve(np.r_[np.zeros(39), 1.0])
+    assert x[9] == pytest.approx(10, rel=1e-6)
+    assert x[39] == pytest.approx(39, rel=1e-6)
+
+
+def test_a_wrong_package_is_replaced(monkeypatch):
+    monkeypatch.setattr(solve, "_rslab", lambda A: lambda b: 2 * b)
+    factor = factorize(chain(20))
+    x = factor.solve(np.ones(20))
+    np.testing.assert_allclose(chain(20) @ x, 1, rtol=1e-12)
+    assert factor.name == "superlu"
+    assert "rslab" in factor.notes[0]
+
+
+def test_a_slightly_wrong_package_is_refined(monkeypatch):
+    good = solve._superlu
+    monkeypatch.setattr(solve, "_rslab", lambda A: lambda b: (1 + 1e-6) * good(A)(b))
+    factor = factorize(chain(20))
+    np.testing.assert_allclose(chain(20) @ factor.solve(np.ones(20)), 1, rtol=1e-11)
+    assert factor.name == "rslab"
+    assert factor.notes == ()
+
+
+def test_a_failing_package_is_replaced(monkeypatch):
+    def fails(A):
+        if A[0, 0] == 2.0:
+            raise RuntimeError("zero pivot")
+        return solve._superlu(A)
+
+    monkeypatch.setattr(solve, "_rslab", fails)
+    factor = factorize(chain(20))
+    assert factor.name == "superlu"
+    assert "zero pivot" in factor.notes[0]
+
+
+def test_no_package_left(monkeypatch):
+    monkeypatch.setattr(solve, "_superlu", lambda A: lambda b: 2 * b)
+    with pytest.raises(SingularSystem, match="superlu"):
+        factorize(chain(20), method="superlu").solve(np.ones(20))
+
+
+def test_superlu_note_above_its_size(monkeypatch):
+    monkeypatch.setattr(solve, "SUPERLU_LIMIT", 10)
+    assert "pip install rslab" in factorize(chain(20), method="superlu").notes[0]
+
+
+def test_bad_input():
+    with pytest.raises(BadValue):
+        factorize(chain(4), method="gauss")
+    with pytest.raises(BadValue):
+        factorize(np.nan * chain(4))
+    with pytest.raises(BadValue):
+        factorize(chain(4)).solve(np.full(4, np.inf))
+
+
+def test_nothing_to_solve():
+    assert factorize(sp.csr_matrix((0, 0))).solve(np.zeros(0)).shape == (0,)
+    assert factorize(chain(4)).solve(np.zeros((4, 0))).shape == (4, 0)
+    np.testing.assert_array_equal(factorize(chain(4)).solve(np.zeros(4)), 0)
