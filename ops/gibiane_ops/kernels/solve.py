@@ -274,8 +274,7 @@ def _amg(A: sp.csr_matrix, near_null: FloatArray | None) -> Solve:
     def solve(b: FloatArray) -> FloatArray:
         columns = b.reshape(len(b), -1)
         # pyamg warns when it breaks down on a singular matrix: the residual check of Factor finds that out
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(record=True), np.errstate(all="ignore"):
             found = [hierarchy.solve(column, tol=1e-11, accel="cg", maxiter=200) for column in columns.T]
         return np.stack(found, axis=1).reshape(b.shape)
 
