@@ -1,0 +1,41 @@
+"""The list of known shapes; a new one is its own file and one entry here."""
+
+from __future__ import annotations
+
+from gibiane_ops.kernels.elements.hexahedron import CUB8
+from gibiane_ops.kernels.elements.point import POI1
+from gibiane_ops.kernels.elements.prism import PRI6
+from gibiane_ops.kernels.elements.pyramid import PYR5
+from gibiane_ops.kernels.elements.quadrangle import QUA4
+from gibiane_ops.kernels.elements.segment import SEG2
+from gibiane_ops.kernels.elements.shape import Shape
+from gibiane_ops.kernels.elements.tetrahedron import TET4
+from gibiane_ops.kernels.elements.triangle import TRI3
+from gibiane_ops.kernels.errors import BadValue
+
+SHAPES: dict[str, Shape] = {each.name: each for each in (POI1, SEG2, TRI3, QUA4, TET4, PYR5, PRI6, CUB8)}
+BY_MESHIO: dict[str, Shape] = {each.meshio_name: each for each in SHAPES.values()}
+BY_GMSH: dict[int, Shape] = {each.gmsh_type: each for each in SHAPES.values()}
+
+
+def shape(name: str) -> Shape:
+    """Find a shape by its name.
+
+    Parameters
+    ----------
+    name : str
+        E.g. ``CUB8``.
+
+    Returns
+    -------
+    Shape
+
+    Raises
+    ------
+    BadValue
+        When no shape has this name.
+    """
+    found = SHAPES.get(name)
+    if found is None:
+        raise BadValue("shape", name, f"one of {' '.join(SHAPES)}")
+    return found
