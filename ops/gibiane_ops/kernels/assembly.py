@@ -87,7 +87,8 @@ def element_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
         G = gradient.reshape(*gradient.shape[:2], n * dim)
         Z = np.matmul(G.transpose(0, 2, 1), G).reshape(-1, n, dim, n, dim).transpose(0, 1, 3, 2, 4)
         pairs = Z.reshape(len(Z), n * n, dim * dim)
-        blocks = np.matmul(pairs, law[part]) if law.ndim == 3 else (pairs.reshape(-1, dim * dim) @ law)
+        # Batched even for one law: as a single tall product, BLAS threads cost more than they bring.
+        blocks = np.matmul(pairs, law[part] if law.ndim == 3 else law)
         K[part] = blocks.reshape(-1, n, n, dim, dim).transpose(0, 1, 3, 2, 4)
     return K.reshape(m, n * dim, n * dim)
 

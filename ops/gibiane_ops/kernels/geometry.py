@@ -32,7 +32,8 @@ def jacobians(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
     """
     m, n, space_dim = X.shape
     dN = shape.dN(xi)
-    flat = X.transpose(0, 2, 1).reshape(m * space_dim, n) @ dN.transpose(1, 0, 2).reshape(n, -1)
+    # A batch of small products: one tall product would wake BLAS threads, which cost far more than they bring here.
+    flat = np.matmul(X.transpose(0, 2, 1), dN.transpose(1, 0, 2).reshape(n, -1))
     return flat.reshape(m, space_dim, len(xi), shape.dim).transpose(0, 2, 1, 3)
 
 
