@@ -173,8 +173,7 @@ def assemble(
     """
     graph = node_pattern(n_nodes, [cells for cells, _ in blocks]) if pattern is None else pattern
     pairs = [
-        Ke.reshape(len(c), c.shape[1], d, c.shape[1], d).transpose(0, 1, 3, 2, 4).reshape(-1, d * d)
-        for c, Ke in blocks
+        Ke.reshape(len(c), c.shape[1], d, c.shape[1], d).transpose(0, 1, 3, 2, 4).reshape(-1, d * d) for c, Ke in blocks
     ]
     data = (graph.gather @ (pairs[0] if len(pairs) == 1 else np.concatenate(pairs))).reshape(-1, d, d)
     size = n_nodes * d

@@ -33,7 +33,7 @@ def jacobians(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
     m, n, space_dim = X.shape
     dN = shape.dN(xi)
     # A batch of small products: one tall product would wake BLAS threads, which cost far more than they bring here.
-    flat = np.matmul(X.transpose(0, 2, 1), dN.transpose(1, 0, 2).reshape(n, -1))
+    flat: FloatArray = np.matmul(X.transpose(0, 2, 1), dN.transpose(1, 0, 2).reshape(n, -1))
     return flat.reshape(m, space_dim, len(xi), shape.dim).transpose(0, 2, 1, 3)
 
 
@@ -177,7 +177,7 @@ def positions(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
     -------
     (m, q, space_dim) float64, length
     """
-    return np.matmul(shape.N(xi), X)
+    return np.asarray(np.matmul(shape.N(xi), X), np.float64)
 
 
 def centroids(shape: Shape, X: FloatArray) -> FloatArray:

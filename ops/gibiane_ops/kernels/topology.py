@@ -1,0 +1,261 @@
+"""Facets, boundary, edges and neighbourhoods of a mesh given as blocks of cells.
+
+A mesh is a sequence of blocks ``(shape name, cells)`` with ``cells : (m, n_nodes) int64``. Cells are numbered through
+the blocks in their order: the cells of the second block follow those of the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from gibiane_ops.kernels.arrays import IntArray
+from gibiane_ops.kernels.elements.table import shape
+
+Block = tuple[str, IntArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """Facets of one shape.
+
+    Attributes
+    ----------
+    name : str
+        Shape name of the facets.
+    nodes : (k, n) int64
+        Their nodes, turning so that the normal leaves the cell that they come from.
+    cell : (k,) int64
+        Number of that cell, counted through the blocks.
+    local : (k,) int64
+        Which facet of the cell it is.
+    """
+
+    name: str
+    nodes: IntArray
+    cell: IntArray
+    local: IntArray
+
+    def take(self, rows: IntArray) -> Facets:
+        """Return the facets of the given rows."""
+        return Facets(self.name, self.nodes[rows], self.cell[rows], self.local[rows])
+
+
+def faces_of(blocks: Sequence[Block]) -> dict[str, Facets]:
+    """List every facet of every cell; a facet between two cells comes twice, once from each side.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    dict of str to Facets
+        By shape of facet, in the order of the cells then of their facets.
+    """
+    found: dict[str, list[Facets]] = {}
+    start = 0
+    for name, cells in blocks:
+        faces = shape(name).faces
+        numbers = np.arange(start, start + len(cells))
+        start += len(cells)
+        for face_name in dict.fromkeys(face for face, _ in faces):
+            local = [(i, nodes) for i, (face, nodes) in enumerate(faces) if face == face_name]
+            nodes = cells[:, np.array([list(each) for _, each in local])]
+            found.setdefault(face_name, []).append(
+                Facets(
+                    face_name,
+                    nodes.reshape(-1, nodes.shape[-1]),
+                    np.repeat(numbers, len(local)),
+                    np.tile(np.array([i for i, _ in local]), len(cells)),
+                )
+            )
+    return {name: _joined(name, parts) for name, parts in found.items()}
+
+
+def _joined(name: str, parts: list[Facets]) -> Facets:
+    """Concatenate lists of facets of one shape."""
+    return Facets(
+        name,
+        np.concatenate([part.nodes for part in parts]),
+        np.concatenate([part.cell for part in parts]),
+        np.concatenate([part.local for part in parts]),
+    )
+
+
+def group_by_nodes(nodes: IntArray) -> tuple[IntArray, IntArray]:
+    """Give the same number to rows that hold the same nodes, in any order.
+
+    Parameters
+    ----------
+    nodes : (k, n) int64
+
+    Returns
+    -------
+    group : (k,) int64
+        Number of the set of each row, 0 to n_groups - 1, in order of first appearance.
+    first : (n_groups,) int64
+        First row of each group, increasing.
+
+    Cost
+    ----
+    One lexicographic sort of the rows.
+    """
+    if len(nodes) == 0:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    keys = np.sort(nodes, axis=1)
+    order = np.lexsort(keys.T)
+    starts = np.r_[True, (keys[order[1:]] != keys[order[:-1]]).any(axis=1)]
+    group = np.empty(len(nodes), np.int64)
+    group[order] = np.cumsum(starts) - 1
+    # lexsort is stable, so the first row of each run is its first appearance.
+    first = order[starts]
+    rank = np.empty(len(first), np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[group], np.sort(first)
+
+
+def boundary(blocks: Sequence[Block]) -> dict[str, Facets]:
+    """Find the facets used by one cell only.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    dict of str to Facets
+        By shape of facet; normals leave the solid. Shapes without a boundary facet are absent.
+    """
+    result = {}
+    for name, facets in faces_of(blocks).items():
+        group, _ = group_by_nodes(facets.nodes[:, : shape(name).n_corners])
+        alone = np.flatnonzero(np.bincount(group)[group] == 1)
+        if len(alone):
+            result[name] = facets.take(alone)
+    return result
+
+
+def neighbours(blocks: Sequence[Block]) -> IntArray:
+    """Find the pairs of cells that share a facet.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    (k, 2) int64
+        Numbers of the cells, the smaller first; one row per shared facet. Where more than two cells share a facet,
+        consecutive ones are paired.
+    """
+    pairs = [np.zeros((0, 2), np.int64)]
+    for name, facets in faces_of(blocks).items():
+        group, _ = group_by_nodes(facets.nodes[:, : shape(name).n_corners])
+        order = np.lexsort((facets.cell, group))
+        same = np.flatnonzero(group[order[1:]] == group[order[:-1]])
+        pairs.append(np.stack([facets.cell[order[same]], facets.cell[order[same + 1]]], axis=1))
+    return np.concatenate(pairs)
+
+
+def edges(blocks: Sequence[Block]) -> IntArray:
+    """List the edges once each.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    (k, 2) int64
+        End nodes, the smaller first; rows sorted.
+    """
+    ends = [np.zeros((0, 2), np.int64)]
+    for name, cells in blocks:
+        local = np.array([edge[:2] for edge in shape(name).edges], np.int64).reshape(-1, 2)
+        ends.append(np.sort(cells[:, local].reshape(-1, 2), axis=1))
+    every = np.concatenate(ends)
+    n = np.int64(every.max(initial=0) + 1)
+    keys = np.unique(every[:, 0] * n + every[:, 1])
+    return np.stack(np.divmod(keys, n), axis=1)
+
+
+def node_to_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[IntArray, IntArray]:
+    """List the cells around each node.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+    n_nodes : int
+        Number of nodes of the mesh.
+
+    Returns
+    -------
+    indptr : (n_nodes + 1,) int64
+    cells : (indptr[-1],) int64
+        Those of node i are ``cells[indptr[i]:indptr[i + 1]]``, increasing.
+    """
+    nodes = [np.zeros(0, np.int64)]
+    numbers = [np.zeros(0, np.int64)]
+    start = 0
+    for _, cells in blocks:
+        nodes.append(cells.ravel())
+        numbers.append(np.repeat(np.arange(start, start + len(cells)), cells.shape[1]))
+        start += len(cells)
+    node, number = np.concatenate(nodes), np.concatenate(numbers)
+    order = np.argsort(node, kind="stable")
+    indptr = np.r_[0, np.cumsum(np.bincount(node, minlength=n_nodes))]
+    return indptr.astype(np.int64), number[order]
+
+
+def node_graph(blocks: Sequence[Block], n_nodes: int) -> sp.csr_array:
+    """Build the graph of the nodes that share a cell.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+    n_nodes : int
+
+    Returns
+    -------
+    (n_nodes, n_nodes) csr_array of int32
+        Entry (i, j) counts the cells that hold both nodes; the diagonal counts the cells of a node.
+    """
+    indptr, cells = node_to_cells(blocks, n_nodes)
+    n_cells = sum(len(each) for _, each in blocks)
+    incidence = sp.csr_array((np.ones(len(cells), np.int32), cells, indptr), shape=(n_nodes, n_cells))
+    return sp.csr_array(incidence @ incidence.T)
+
+
+def solids(blocks: Sequence[Block], n_nodes: int) -> tuple[int, IntArray]:
+    """Split the mesh into pieces that share no node.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+    n_nodes : int
+
+    Returns
+    -------
+    n_solids : int
+    solid : (n_nodes,) int64
+        Number of the piece of each node, in order of the first node; -1 for a node that no cell uses.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    indptr, cells = node_to_cells(blocks, n_nodes)
+    n_cells = sum(len(each) for _, each in blocks)
+    if n_cells == 0:
+        return 0, np.full(n_nodes, -1, np.int64)
+    # Nodes and cells are the two sides of one graph, much smaller than the graph of node pairs.
+    rows = np.repeat(np.arange(n_nodes), np.diff(indptr))
+    links = sp.csr_array((np.ones(len(cells), np.int8), (rows, cells + n_nodes)), shape=(n_nodes + n_cells,) * 2)
+    _, label = connected_components(links, directed=False)
+    solid = np.where(np.diff(indptr) > 0, label[:n_nodes], -1)
+    names, first = np.unique(solid[solid >= 0], return_index=True)
+    rank = np.full(label.max() + 1, -1, np.int64)
+    rank[names[np.argsort(first)]] = np.arange(len(names))
+    return len(names), np.where(solid >= 0, rank[solid], -1)
