@@ -215,3 +215,56 @@ class MissingSystemLibrary(KernelError):
 
     def __str__(self) -> str:
         return f"library {self.library} is missing; on Debian: apt install {self.debian_package}"
+
+
+@dataclass(eq=False)
+class ContactUnbalanced(KernelError):
+    """A body that only contact holds, under a load that no admissible contact force can balance.
+
+    Attributes
+    ----------
+    kind : str
+        ``sliding``, ``tipping`` or ``separation``.
+    share : float
+        Unbalanced part of the load over the load on the free motions.
+    motion : (n_pairs, d) float64
+        Relative rigid motion that starts, in local components, largest entry 1.
+    history : list of float
+        Residuals of the attempt.
+    best : object
+        The best state reached; it does not satisfy the laws.
+    """
+
+    kind: str
+    share: float
+    motion: FloatArray
+    history: list[float]
+    best: object = None
+
+    def __str__(self) -> str:
+        return f"hypostatic ({self.kind}): the contact cannot balance {self.share:.2%} of the load on the free motions"
+
+
+@dataclass(eq=False)
+class StatusCycle(KernelError):
+    """Contact statuses that come back without converging.
+
+    Attributes
+    ----------
+    period : int
+        Number of iterations between two equal sets of statuses.
+    pairs : (k,) int64
+        Pairs whose status changes within the period.
+    history : list of float
+        Criterion after each iteration.
+    best : object
+        Last state.
+    """
+
+    period: int
+    pairs: IntArray
+    history: list[float]
+    best: object = None
+
+    def __str__(self) -> str:
+        return f"statuses of pairs {_first(self.pairs)} come back every {self.period} iterations without converging"
