@@ -1,0 +1,1 @@
+"""A posteriori error: solid part, contact part, and their combination."""
