@@ -170,8 +170,9 @@ class Elimination:
         from scipy.linalg import qr, solve_triangular
 
         part = self.R[rows]
-        unknowns = np.unique(part.indices)
-        A = part[:, unknowns].toarray()
+        unknowns, column = np.unique(part.indices, return_inverse=True)
+        A = np.zeros((len(rows), len(unknowns)))
+        A[np.repeat(np.arange(len(rows)), np.diff(part.indptr)), column] = part.data
         _, upper, order = qr(A.T, mode="economic", pivoting=True)
         diagonal = np.abs(np.diag(upper))
         rank = int((diagonal > 1e-10 * diagonal[0]).sum())
