@@ -12,11 +12,10 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.errors import BadValue, MissingPackage, SingularSystem
 
-FloatArray = NDArray[np.float64]
 Solve = Callable[[FloatArray], FloatArray]
 
 RESIDUAL_LIMIT = 1e-9
@@ -45,7 +44,7 @@ class Factor:
         What the user should know: a slow package, a package that failed.
     """
 
-    def __init__(self, A: sp.csr_matrix, packages: tuple[str, ...], near_null: FloatArray | None) -> None:
+    def __init__(self, A: sp.csr_array, packages: tuple[str, ...], near_null: FloatArray | None) -> None:
         self._A = A
         self._packages = list(packages)
         self._near_null = near_null
@@ -141,7 +140,9 @@ class Factor:
     def _raise_if_singular(self, shifted: bool) -> None:
         """Look for a null vector by inverse iteration; the matrix itself confirms it, whatever the package did."""
         # a factorisation that broke down is repeated on a slightly shifted matrix, which has the same null vectors
-        solve = self._factorize(self._A + sp.diags(1e-8 / self._scale**2, format="csr")) if shifted else self._solve
+        solve = (
+            self._factorize(self._A + sp.diags_array(1e-8 / self._scale**2, format="csr")) if shifted else self._solve
+        )
         x = np.random.default_rng(0).standard_normal(self._A.shape[0]) / self._scale
         for _ in range(3 if shifted else 1):
             x = solve(x)
@@ -154,7 +155,7 @@ class Factor:
                 raise SingularSystem(f"the matrix is singular ({self.name})", unknowns=unknowns)
             x = x / self._scale**2
 
-    def _factorize(self, A: sp.csr_matrix) -> Solve:
+    def _factorize(self, A: sp.csr_array) -> Solve:
         match self.name:
             case "rslab":
                 return _rslab(A)
@@ -201,7 +202,7 @@ def factorize(A: sp.sparray | sp.spmatrix, *, method: str = "auto", near_null: F
     ----
     On 3D elasticity with n unknowns, about n^2 operations and n^(4/3) memory; ``amg`` is linear in both.
     """
-    A = sp.csr_matrix(A, dtype=np.float64)
+    A = sp.csr_array(A, dtype=np.float64)
     if not np.isfinite(A.data).all():
         raise BadValue("matrix entry", float(A.data[~np.isfinite(A.data)][0]), "a finite value")
     if method == "auto":
@@ -221,7 +222,7 @@ def _is_installed(name: str) -> bool:
     return importlib.util.find_spec(_MODULES[name]) is not None
 
 
-def _diagonal_scale(A: sp.csr_matrix) -> FloatArray:
+def _diagonal_scale(A: sp.csr_array) -> FloatArray:
     """Give the scaling that makes the diagonal 1; a zero or negative diagonal is no positive definite matrix."""
     diagonal = A.diagonal()
     bad = np.flatnonzero(~(diagonal > 0))
@@ -230,7 +231,7 @@ def _diagonal_scale(A: sp.csr_matrix) -> FloatArray:
     return np.asarray(1 / np.sqrt(diagonal))
 
 
-def _rslab(A: sp.csr_matrix) -> Solve:
+def _rslab(A: sp.csr_array) -> Solve:
     import rslab
 
     factor = rslab.ldlt(A.tocsc())
@@ -241,7 +242,7 @@ def _rslab(A: sp.csr_matrix) -> Solve:
     return solve
 
 
-def _pardiso(A: sp.csr_matrix) -> Solve:
+def _pardiso(A: sp.csr_array) -> Solve:
     from pypardiso import PyPardisoSolver
     from pypardiso.pardiso_wrapper import PyPardisoError
 
@@ -254,7 +255,7 @@ def _pardiso(A: sp.csr_matrix) -> Solve:
     return lambda b: np.asarray(solver.solve(upper, np.asfortranarray(b))).reshape(b.shape)
 
 
-def _superlu(A: sp.csr_matrix) -> Solve:
+def _superlu(A: sp.csr_array) -> Solve:
     from scipy.sparse.linalg import splu
 
     options = {"SymmetricMode": True}
@@ -262,7 +263,7 @@ def _superlu(A: sp.csr_matrix) -> Solve:
     return lambda b: np.asarray(factor.solve(b))
 
 
-def _amg(A: sp.csr_matrix, near_null: FloatArray | None) -> Solve:
+def _amg(A: sp.csr_array, near_null: FloatArray | None) -> Solve:
     import pyamg
 
     smoother = ("block_gauss_seidel" if near_null is not None else "gauss_seidel", {"sweep": "symmetric"})

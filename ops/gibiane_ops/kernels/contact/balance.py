@@ -1,0 +1,116 @@
+"""Why a contact problem has no solution: tell whether any admissible contact force can balance the load."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import numpy as np
+
+from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection
+from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.report import ContactState
+from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
+
+UNBALANCED = 1e-5
+"""Part of the load that may stay unbalanced before the problem is said to have no solution."""
+
+
+def unbalanced_load(interface: Interface, mu: FloatArray, *, max_iter: int = 5000) -> tuple[float, FloatArray]:
+    """Measure the part of the load on free rigid motions that no force of Coulomb's cone can balance.
+
+    Parameters
+    ----------
+    interface : Interface
+    mu : (n,) float64
+    max_iter : int
+        Steps of the projected gradient method.
+
+    Returns
+    -------
+    share : float
+        Unbalanced part over the load on the free motions; 0 when the load can be balanced.
+    motion : (n, d) float64
+        Relative rigid motion that the unbalanced part drives, largest entry 1, zero when there is none.
+
+    Notes
+    -----
+    Minimises ``abs(R^T (f + r))`` over all r in the cone, R the free motions. A positive minimum proves that there
+    is no static solution; a zero one does not prove that there is one.
+
+    Cost
+    ----
+    Each step costs a few operations per pair.
+    """
+    R, load = interface.rigid, interface.rigid.T @ interface.f
+    size = float(np.linalg.norm(load))
+    shape = interface.n_pairs, interface.dim
+    if size == 0:
+        return 0.0, np.zeros(shape)
+    mu = np.minimum(mu, 1e6)
+    r = ahead = np.zeros(shape)
+    left, t = load, 1.0
+    for _ in range(max_iter):
+        step = ahead - (R @ (load + R.T @ ahead.ravel())).reshape(shape)
+        new = orthogonal_projection(np.where(interface.active, step, 0.0), mu)
+        new[~interface.active[:, 0]] = 0.0
+        # Nesterov's acceleration, restarted when it turns back
+        if ((ahead - new) * (new - r)).sum() > 0:
+            t = 1.0
+        t_new = (1 + np.sqrt(1 + 4 * t * t)) / 2
+        ahead = new + (t - 1) / t_new * (new - r)
+        r, t = new, t_new
+        left = load + R.T @ r.ravel()
+        if np.linalg.norm(left) <= 0.1 * UNBALANCED * size:
+            break
+    share = float(np.linalg.norm(left)) / size
+    motion = (R @ left).reshape(shape)
+    return share, motion / (np.abs(motion).max() or 1.0)
+
+
+def explain_failure(interface: Interface, state: ContactState) -> NoReturn:
+    """Raise the error that says why no solution was found.
+
+    Parameters
+    ----------
+    interface : Interface
+    state : ContactState
+        Best state reached.
+
+    Raises
+    ------
+    ContactUnbalanced
+        When the load cannot be balanced; ``kind`` is ``sliding``, ``tipping`` or ``separation``.
+    NotConverged
+        When it can.
+    """
+    share, motion = unbalanced_load(interface, state.mu)
+    if share > UNBALANCED:
+        raise ContactUnbalanced(kind_of_motion(motion, state.mu), share, motion, state.history, state)
+    raise NotConverged(state.history, state)
+
+
+def kind_of_motion(motion: FloatArray, mu: FloatArray) -> str:
+    """Name a relative rigid motion that the contact does not prevent.
+
+    Parameters
+    ----------
+    motion : (n, d) float64
+        Local components; opening is negative along the normal.
+    mu : (n,) float64
+
+    Returns
+    -------
+    str
+        ``sliding``, ``tipping`` or ``separation``.
+
+    Notes
+    -----
+    The motion belongs to the polar cone, so that a pure slide comes with an opening ``mu abs(w_t)``, which is no
+    physical opening and is set aside.
+    """
+    opening = -motion[:, 0] - mu * norms(motion[:, 1:])
+    size = float(np.sqrt((motion**2).sum(axis=1)).max())
+    if opening.max() <= 0.05 * size:
+        return "sliding"
+    return "separation" if np.ptp(motion[:, 0]) <= 0.05 * size else "tipping"

@@ -1,0 +1,161 @@
+"""The state of a contact interface, and how far it is from the laws it should obey."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.contact.cone import friction_bound, norms
+from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.errors import BadValue
+
+OPEN, STICK, SLIP = 0, 1, 2
+
+
+@dataclass(frozen=True, eq=False)
+class ContactReport:
+    """Departures of a state from equilibrium and from the laws; all but the counts are relative.
+
+    Attributes
+    ----------
+    penetration : float
+        Largest ``w_n - gap`` over the natural length of the interface.
+    tension : float
+        Largest tensile normal force over the largest force.
+    excess_friction : float
+        Largest ``abs(r_t) - mu abs(r_n)`` over the largest ``mu abs(r_n)``, or over the largest force without friction.
+    adhesion_power : float
+        ``sum abs(r_n (w_n - gap))`` over ``scale``: a pair that is open and loaded.
+    friction_power : float
+        ``sum mu abs(r_n) abs(w_t) + r_t . w_t`` over ``scale``: slip that is not opposed by its friction force.
+    balance : float
+        Largest residual of ``S w = f + r`` over the largest force.
+    dissipation : float, energy
+        ``sum -r_t . w_t``.
+    n_open, n_stick, n_slip : int
+    """
+
+    penetration: float
+    tension: float
+    excess_friction: float
+    adhesion_power: float
+    friction_power: float
+    balance: float
+    dissipation: float
+    n_open: int
+    n_stick: int
+    n_slip: int
+
+    @property
+    def worst(self) -> float:
+        """Largest departure from a law or from equilibrium."""
+        return max(
+            self.penetration, self.tension, self.excess_friction, self.adhesion_power, abs(self.friction_power),
+            self.balance,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ContactState:
+    """Relative displacements and forces of the pairs, in local components (normal first).
+
+    Attributes
+    ----------
+    w : (n, d) float64, length
+    r : (n, d) float64, force on body 1
+    status : (n,) int64
+        0 open, 1 stick, 2 slip.
+    mu : (n,) float64
+    history : list of float
+        Residual after each step, relative.
+    report : ContactReport
+    """
+
+    w: FloatArray
+    r: FloatArray
+    status: IntArray
+    mu: FloatArray
+    history: list[float]
+    report: ContactReport
+
+    @property
+    def iterations(self) -> int:
+        """Number of steps."""
+        return len(self.history)
+
+
+def coefficients(interface: Interface, mu: float | FloatArray) -> FloatArray:
+    """Give one friction coefficient per pair.
+
+    Parameters
+    ----------
+    interface : Interface
+    mu : float or (n,) float64
+
+    Returns
+    -------
+    (n,) float64
+
+    Raises
+    ------
+    BadValue
+        When a coefficient is negative or undefined.
+    """
+    found = np.broadcast_to(np.asarray(mu, dtype=np.float64), interface.n_pairs).copy()
+    bad = ~(found >= 0)
+    if bad.any():
+        raise BadValue("friction coefficient", float(found[bad][0]), "mu >= 0")
+    return found
+
+
+def check_state(
+    interface: Interface,
+    w: FloatArray,
+    r: FloatArray,
+    status: IntArray,
+    mu: FloatArray,
+    history: list[float],
+    slip_origin: FloatArray | None,
+) -> ContactState:
+    """Measure a state against the laws, from the forces and displacements alone.
+
+    Parameters
+    ----------
+    interface : Interface
+    w, r : (n, d) float64
+    status : (n,) int64
+    mu : (n,) float64
+    history : list of float
+    slip_origin : (n, d - 1) float64 or None
+        Tangential displacements from which slip is counted.
+
+    Returns
+    -------
+    ContactState
+    """
+    force = max(float(np.abs(r).max(initial=0)), interface.force_scale) or 1.0
+    length = max(float(np.abs(w).max(initial=0)), force / interface.kref)
+    bound = friction_bound(r[:, 0], mu)
+    finite = np.where(np.isfinite(bound), bound, 0.0)
+    slip = w[:, 1:] - (0.0 if slip_origin is None else slip_origin)
+    opening = interface.gap - w[:, 0]
+    power = np.einsum("ni,ni->n", r[:, 1:], slip)
+    limited = np.isfinite(bound)
+    equilibrium = (interface.S @ w.ravel() - interface.f).reshape(w.shape) - r
+    holds = interface.active[:, 0]
+    report = ContactReport(
+        penetration=float((-opening[holds]).max(initial=0)) / length,
+        tension=float(r[:, 0].max(initial=0)) / force,
+        excess_friction=float((norms(r[:, 1:]) - bound)[limited].max(initial=0))
+        / (float(finite.max(initial=0)) or force),
+        adhesion_power=float(np.abs(r[holds, 0] * opening[holds]).sum()) / (force * length),
+        friction_power=float((finite * norms(slip) + power)[limited].sum()) / (force * length),
+        balance=float(np.abs(equilibrium).max(initial=0)) / force,
+        dissipation=float(-power.sum()),
+        n_open=int((status == OPEN).sum()),
+        n_stick=int((status == STICK).sum()),
+        n_slip=int((status == SLIP).sum()),
+    )
+    return ContactState(w, r, status, mu, list(history), report)
