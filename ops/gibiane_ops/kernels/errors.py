@@ -118,7 +118,7 @@ class Hypostatic(KernelError):
     Attributes
     ----------
     motions : list
-        One record per free motion, see ``constraints.FreeMotion``.
+        One record per free motion, see ``rigid.FreeMotion``.
     """
 
     motions: list[object]
