@@ -1,0 +1,5 @@
+"""`python -m gibiane`."""
+
+from gibiane.cli import main
+
+raise SystemExit(main())

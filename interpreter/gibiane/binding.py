@@ -1,0 +1,346 @@
+"""Operands in a queue, read by type: the one rule by which every operator gets its arguments.
+
+An operator has no left and no right: it takes the leftmost unread value of the type it wants, and a word (MOT or
+PROCEDUR) hides everything behind it until it is read. :class:`Operands` is that queue; :func:`bind` fills one
+declared form from it, or says how far it came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from gibiane.diagnostics import GibianeError, Label, Text, make, nearest
+from gibiane.forms import Arg, Form, Key
+from gibiane.nodes import Literal, Name, Node
+from gibiane.source import SourceText, Span
+from gibiane.values import ANNULE, ANY, ENTIER, FLOTTANT, MOT, PROCEDUR, Procedure, Table, type_of
+
+if TYPE_CHECKING:
+    from gibiane.registry import Operator
+
+
+class Mark:
+    """An access separator waiting in a queue: `.` or `%`."""
+
+    def __init__(self, symbol: str) -> None:
+        self.symbol = symbol
+        self.type_name = symbol
+
+
+DOT, PERCENT = Mark("."), Mark("%")
+ABSENT: Any = object()  # what `take` returns when nothing fits
+
+
+class Operands:
+    """The unread values of one group, in textual order, each with the node it came from."""
+
+    __slots__ = ("nodes", "session", "source", "values")
+
+    def __init__(self, session: Any, source: SourceText, values: list[Any], nodes: list[Node]) -> None:
+        self.session = session
+        self.source = source
+        self.values = values
+        self.nodes = nodes
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def span(self, node: Node) -> Span:
+        """Return the place of a node of this queue."""
+        return Span(self.source, node.start, node.end)
+
+    def first_word(self) -> int:
+        """Return the position of the first MOT or PROCEDUR, or -1."""
+        for i, value in enumerate(self.values):
+            kind = type(value)
+            if kind is str or kind is Procedure:
+                return i
+        return -1
+
+    def take(self, types: Sequence[str], subtype: str | None = None, *, choosy: bool = False) -> tuple[Any, Any]:
+        """Take the leftmost readable value of one of `types`; return (value, node), or (ABSENT, None).
+
+        `choosy` leaves unquoted operator words where they are (used for optional words, which would otherwise
+        swallow the next operator of a chain).
+        """
+        for i, value in enumerate(self.values):
+            kind = type_of(value)
+            fits = kind in types or (kind == ENTIER and FLOTTANT in types) or (types[0] is ANY and kind not in ".%")
+            if kind == PROCEDUR and not fits and MOT in types:
+                fits, value = True, value.name
+            if fits and subtype is not None and isinstance(value, Table):
+                fits = value.subtype == subtype
+            if fits and kind == MOT and choosy:
+                fits = not self.is_operator_word(i)
+            if fits:
+                del self.values[i]
+                node = self.nodes.pop(i)
+                if kind == ENTIER and types[0] == FLOTTANT and len(types) == 1:
+                    value = float(value)
+                return value, node
+            if kind in (MOT, PROCEDUR):
+                break
+        return ABSENT, None
+
+    def is_operator_word(self, i: int) -> bool:
+        """Say whether position `i` holds an unquoted word that is an operator."""
+        node = self.nodes[i]
+        if isinstance(node, Literal) and node.quoted:
+            return False
+        return self.session.operator(self.values[i]) is not None
+
+    def read(self, types: str | Sequence[str], *, subtype: str | None = None) -> Any:
+        """Read the leftmost value of `types`, or return None when there is none (see `need`)."""
+        wanted = (types,) if isinstance(types, str) else types
+        value, _ = self.take(wanted, subtype)
+        return None if value is ABSENT else value
+
+    def need(self, types: str | Sequence[str], what: str | None = None) -> Any:
+        """Read the leftmost value of `types`.
+
+        Raises
+        ------
+        GibianeError
+            37 when there is none.
+        """
+        value = self.read(types)
+        if value is None:
+            wanted = types if isinstance(types, str) else " or ".join(types)
+            raise self.missing(wanted, what)
+        return value
+
+    def missing(self, wanted: str, what: str | None = None) -> GibianeError:
+        """Return the error 37 for a type that is not there, with what stands in its place."""
+        labels, span = [], None
+        if self.values:
+            label = self.describe(0, wanted)
+            labels, span = [label], label.span
+        template = "no {type} among its operands" if what is None else "no {type} for {what}"
+        return GibianeError(make(37, template, type=wanted, what=what, labels=labels, span=span))
+
+    def describe(self, i: int, wanted: str | None = None) -> Label:
+        """Return a label that says what operand `i` is, and what was wanted instead."""
+        value, node = self.values[i], self.nodes[i]
+        kind = type_of(value)
+        fields: dict[str, Any] = {"type": kind, "wanted": wanted, "word": value if kind == MOT else ""}
+        if kind == MOT and isinstance(node, Name) and value == node.word:
+            text = "the word {word}: no object has this name"
+        elif kind == MOT:
+            text = "the word '{word}'"
+        elif kind == PROCEDUR:
+            text, fields["word"] = "the procedure {word}", value.name
+        elif kind == ANNULE:
+            text = "no value: the instruction that should have made it failed, or the argument was not given"
+        elif isinstance(node, Name) and (line := self.session.origin(node.name)):
+            text, fields["line"] = "a {type}, made at line {line}", line
+        else:
+            text = "a {type}"
+        if wanted is not None:
+            text += "; a {wanted} is needed here"
+        return Label(self.span(node), Text(text, fields))
+
+    def read_keyword(self, words: Sequence[str], width: int = 4) -> str | None:
+        """Read one of `words` if it is the first unread word (compared on `width` letters), else return None."""
+        i = self.first_word()
+        if i < 0 or type(self.values[i]) is not str:
+            return None
+        word = self.values[i][:width]
+        for candidate in words:
+            if candidate[:width] == word:
+                del self.values[i], self.nodes[i]
+                return candidate
+        return None
+
+    def need_keyword(self, words: Sequence[str], width: int = 4) -> str:
+        """Read one of `words`.
+
+        Raises
+        ------
+        GibianeError
+            7 with the accepted list, when the first word is another or there is none.
+        """
+        found = self.read_keyword(words, width)
+        if found is None:
+            raise self.unknown_keyword(words)
+        return found
+
+    def unknown_keyword(self, words: Sequence[str]) -> GibianeError:
+        """Return the error 7 for the first unread word, with the accepted ones."""
+        i = self.first_word()
+        accepted = ", ".join(f"'{w}'" for w in words)
+        if i < 0:
+            return GibianeError(make(7, "a keyword is missing; accepted: {accepted}", accepted=accepted))
+        value = self.values[i]
+        word = value if isinstance(value, str) else value.name
+        close = nearest(word[:8], list(words))
+        return GibianeError(make(7, "unknown keyword '{word}'; accepted: {accepted}", word=word, accepted=accepted,
+                                 span=self.span(self.nodes[i]), hint="did you mean '{close}'?" if close else None,
+                                 close=close))
+
+    def push_front(self, results: Sequence[Any], node: Node) -> None:
+        """Put results at the front, in order, where the next operator finds them first."""
+        self.values[:0] = results
+        self.nodes[:0] = [node] * len(results)
+
+
+class Mismatch:
+    """How far one form came: values bound, and what it still wanted."""
+
+    def __init__(self, form: Form, matched: int, wanted: Arg | Key | None, blocker: int, keys: Sequence[str]) -> None:
+        self.form = form
+        self.matched = matched
+        self.wanted = wanted
+        self.blocker = blocker
+        self.keys = keys
+
+
+def bind(form: Form, q: Operands) -> tuple[dict[str, Any], dict[str, Node]] | Mismatch:
+    """Fill a form's parameters from the queue, or leave the queue as it was and say what was missing.
+
+    Positional arguments are read in declared order as far as words allow; then the first word, if it is one of
+    the form's keywords, is read with its own arguments; and so on until nothing more can be read.
+    """
+    values, nodes = q.values.copy(), q.nodes.copy()
+    bound: dict[str, Any] = dict(form.defaults)
+    places: dict[str, Node] = {}
+    pending = list(form.args)
+    matched = 0
+    wanted: Arg | Key | None = None
+    used: set[str] = set()
+    while True:
+        read = _read_args(pending, q, bound, places, form)
+        matched += read
+        key = _next_key(form, q, used)
+        if key is None:
+            if read:
+                continue
+            break
+        i = q.first_word()
+        places[key.name] = q.nodes[i]
+        word = key.match(q.values[i]) or ""
+        del q.values[i], q.nodes[i]
+        if not key.repeat:
+            used.add(key.name)
+        matched += 1
+        wanted = _read_key(key, word, q, bound)
+        if wanted is not None:
+            break
+    if wanted is None:
+        wanted = next((a for a in pending if not a.optional and not (a.many and bound[a.name])), None)
+    if wanted is None:
+        wanted = next((k for k in form.keys if k.required and k.name not in used), None)
+    if wanted is None:
+        return bound, places
+    blocker = q.first_word()
+    unread = [w for k in form.keys if k.name not in used for w in k.words]
+    mismatch = Mismatch(form, matched, wanted, blocker, unread)
+    q.values[:], q.nodes[:] = values, nodes
+    return mismatch
+
+
+def _read_args(pending: list[Arg], q: Operands, bound: dict[str, Any], places: dict[str, Node], form: Form) -> int:
+    count = 0
+    for arg in list(pending):
+        while True:
+            if MOT in arg.types and _key_ahead(form, q):
+                break
+            value, node = q.take(arg.types, arg.subtype, choosy=arg.optional or arg.many)
+            if value is ABSENT:
+                break
+            count += 1
+            places.setdefault(arg.name, node)
+            if not arg.many:
+                bound[arg.name] = value
+                pending.remove(arg)
+                break
+            bound[arg.name] = [*bound[arg.name], value]
+    return count
+
+
+def _key_ahead(form: Form, q: Operands) -> bool:
+    i = q.first_word()
+    return i >= 0 and isinstance(q.values[i], str) and any(key.match(q.values[i]) for key in form.keys)
+
+
+def _next_key(form: Form, q: Operands, used: set[str]) -> Key | None:
+    i = q.first_word()
+    if i < 0:
+        return None
+    word = q.values[i]
+    if not isinstance(word, str):
+        return None
+    return next((key for key in form.keys if key.name not in used and key.match(word)), None)
+
+
+def _read_key(key: Key, word: str, q: Operands, bound: dict[str, Any]) -> Arg | None:
+    """Read the arguments of a keyword into `bound`; return the first missing mandatory one."""
+    got: list[Any] = []
+    for arg in key.args:
+        if arg.many:
+            several: list[Any] = []
+            while (value := q.take(arg.types, arg.subtype, choosy=True)[0]) is not ABSENT:
+                several.append(value)
+            if not several and not arg.optional:
+                return arg
+            got.append(several)
+            continue
+        value, _ = q.take(arg.types, arg.subtype, choosy=arg.optional)
+        if value is ABSENT:
+            if not arg.optional:
+                return arg
+            value = None
+        got.append(value)
+    if len(key.words) > 1:
+        result: Any = (word, *got) if got else word
+    elif not key.args:
+        result = True
+    else:
+        result = got[0] if len(got) == 1 else tuple(got)
+    bound[key.name] = [*bound[key.name], result] if key.repeat else result
+    return None
+
+
+def explain(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeError:
+    """Word the failure of every form of an operator: an unknown keyword, a missing operand, or wrong types."""
+    best = max(misses, key=lambda m: m.matched)
+    forms = [m.form.usage(operator.name) for m in misses][:6]
+    i = q.first_word()
+    if operator.symbolic:
+        failure = _explain_infix(operator, misses, q)
+    elif i >= 0 and best.keys and isinstance(q.values[i], str) and not q.is_operator_word(i):
+        keys = sorted({w for m in misses for w in m.keys})
+        failure = q.unknown_keyword(keys)
+    elif isinstance(best.wanted, Key):
+        words = " or ".join(f"'{w}'" for w in best.wanted.words)
+        failure = GibianeError(make(7, "a keyword is missing: {words}", words=words))
+    elif best.wanted is not None:
+        failure = q.missing(" or ".join(best.wanted.types), best.wanted.doc if best.matched else None)
+    else:
+        failure = q.missing(ANY)
+    failure.diagnostic.forms = forms
+    failure.diagnostic.more = f"INFO {operator.name} ;"
+    return failure
+
+
+def _explain_infix(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeError:
+    readable = []
+    for i, value in enumerate(q.values):
+        if type_of(value) in (MOT, PROCEDUR):
+            break
+        readable.append(i)
+    if len(readable) >= 2:
+        labels = [q.describe(i) for i in readable[:2]]
+        types = [type_of(q.values[i]) for i in readable[:2]]
+        return GibianeError(make(196, "cannot work on {left} and {right}", left=types[0], right=types[1],
+                                 labels=labels, span=labels[0].span))
+    if readable:
+        labels = [q.describe(0)]
+        hint = "two operands are wanted" if operator.name not in "+-" else (
+            "two operands are wanted; a sign belongs to a number only: write -1 * X")
+        if len(q.values) > 1:
+            labels.append(q.describe(1))
+        return GibianeError(make(37, "its second operand is missing", labels=labels, span=labels[0].span, hint=hint))
+    labels = [q.describe(0)] if q.values else []
+    return GibianeError(make(533, "its operands are missing", labels=labels, span=labels[0].span if labels else None))
+

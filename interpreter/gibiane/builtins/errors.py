@@ -1,0 +1,39 @@
+"""ERRE as a directive: stop, or obey OPTI ERRE. The indicator forms of the same operator come from elsewhere."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gibiane.diagnostics import GibianeError, level_of, make
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, operator
+from gibiane.values import ANY, ENTIER, MOT
+
+ERRE = operator("ERREUR", topic="errors", summary="raise an error, or estimate the error of a solution",
+                notice="Directive: `ERRE 0` does nothing, `ERRE n` raises error n (5 is fatal: how tests fail), "
+                       "`ERRE 'text'` writes the text and raises error 308. OPTI ERRE says what an error does. "
+                       "Operator: with a model, a stress field and a material, the error indicator.",
+                example="OPTI ERRE IGNO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;", see=["OPTION"])
+
+
+@ERRE.form(Arg("n", ENTIER, "number of the error"), Key("AVEC", "values for its text", Arg("x", ANY, many=True)))
+def _raise(ctx: Context, n: int, avec: list[Any] | None) -> None:
+    if n == 0:
+        return
+    sentence = "a test of this script failed" if n == 5 else "raised by the script"
+    if avec:
+        sentence += " ({values})"
+    values = ", ".join(ctx.session.brief(v) for v in avec or [])
+    raise GibianeError(make(n, sentence, operator="ERREUR", span=ctx.operands.span(ctx.node), values=values,
+                            level=level_of(str(n))))
+
+
+@ERRE.form(Arg("text", MOT, "text to show"), last=True)
+def _raise_text(ctx: Context, text: str) -> None:
+    ctx.write(text)
+    ctx.fail(308, "raised by the script: {text}", text=text)
+
+
+@ERRE.form(last=True)
+def _nothing(ctx: Context) -> None:
+    ctx.fail(533, "a number, a text, or the operands of the indicator are wanted")

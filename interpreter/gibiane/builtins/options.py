@@ -1,0 +1,202 @@
+"""OPTI and VALE: the options of a session. Operator packages listen to the ones they care about."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from gibiane.binding import Operands
+from gibiane.diagnostics import nearest
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, operator
+from gibiane.values import ANY, ENTIER, FLOTTANT, LOGIQUE, MOT, POINT, type_of
+
+Reader = Callable[[Context, Operands], Any]
+
+
+def _word(q: Operands) -> str:
+    return str(q.need(MOT)).strip()
+
+
+def _one_of(*choices: str) -> Reader:
+    def read(ctx: Context, q: Operands) -> str:
+        return q.need_keyword(choices)
+
+    return read
+
+
+def _integer(low: int, high: int) -> Reader:
+    def read(ctx: Context, q: Operands) -> int:
+        node = q.nodes[0] if q.nodes else ctx.node
+        value = int(q.need(ENTIER))
+        if not low <= value <= high:
+            ctx.places["value"] = node
+            ctx.fail(42, "{value} is out of bounds: {low} to {high} is accepted", at="value", value=value, low=low,
+                     high=high)
+        return value
+
+    return read
+
+
+def _real(ctx: Context, q: Operands) -> float:
+    return float(q.need(FLOTTANT))
+
+
+def _density(ctx: Context, q: Operands) -> float:
+    node = q.nodes[0] if q.nodes else ctx.node
+    value = float(q.need(FLOTTANT))
+    if value < 0 or value != value:
+        ctx.places["value"] = node
+        ctx.fail(17, "a density is a length: {value} cannot be one", at="value", value=value)
+    return value
+
+
+def _mode(ctx: Context, q: Operands) -> str:
+    word = q.need_keyword(("PLAN", "AXIS", "TRID", "FOUR", "UNID"))
+    if word == "PLAN":
+        return "PLAN " + (q.read_keyword(("CONT", "DEFO", "GENE")) or "DEFO")
+    if word == "UNID":
+        return "UNID " + (q.read_keyword(("PLAN", "AXIS", "SPHE")) or "PLAN")
+    if word == "FOUR":
+        return f"FOUR {q.need(ENTIER)}"
+    return word
+
+
+def _anything(ctx: Context, q: Operands) -> Any:
+    value = q.read((LOGIQUE, ENTIER, FLOTTANT, POINT))
+    if value is None:
+        value = q.read(MOT)
+    if value is None:
+        raise q.missing("value")
+    return value
+
+
+def _file(ctx: Context, q: Operands) -> Any:
+    unit = q.read(ENTIER)
+    return unit if unit is not None else _word(q)
+
+
+def _language(ctx: Context, q: Operands) -> str:
+    return q.need_keyword(("FRAN", "ANGL"))
+
+
+def _input(ctx: Context, q: Operands) -> Any:
+    unit = q.read(ENTIER)
+    if unit is not None:
+        ctx.session.state["input unit"] = unit
+        return unit
+    path = Path(_word(q))
+    if not path.is_file():
+        ctx.fail(1130, "the script {path} cannot be opened", path=path.as_posix())
+    ctx.session.state["pending input"] = path
+    return path.as_posix()
+
+
+OPTIONS: dict[str, Reader] = {
+    "DIME": _integer(1, 3), "MODE": _mode, "ELEM": lambda ctx, q: _word(q), "DENS": _density,
+    "ECHO": _integer(-1, 2), "ERRE": _one_of("FATA", "NORM", "CONT", "IGNO"), "LANG": _language,
+    "SORT": _file, "SAUV": _file, "REST": _file, "ACQU": _file, "LECT": _file, "DONN": _input, "IMPR": _file,
+    "TRAC": _anything, "FTRA": _file, "EPTR": _anything, "ISOV": _anything, "COUL": _anything, "COSC": _anything,
+    "OEIL": _anything, "TITR": _anything, "RESO": _anything, "NORM": _anything, "PREC": _real, "PETI": _real,
+    "GRAN": _real, "ZERO": _real, "VERI": _anything, "IMPI": _anything, "DEBU": _anything, "LOCA": _anything,
+    "EPSI": _anything, "INCO": _anything,
+}
+IGNORED = ("POTR", "POLI", "CADR", "SURV", "ATTE", "ASSI", "PARA", "PLAC", "NGMA", "NAVI", "LAGR", "ACCE", "OMEG")
+for _old in IGNORED:
+    OPTIONS[_old] = _anything
+
+OPTI = operator("OPTION", topic="language", summary="set options of the session",
+                notice="Pairs of a word and its value: DIME 1, 2 or 3; ELEM type of elements; MODE PLAN CONT, PLAN DEFO, "
+                       "AXIS, TRID; DENS density; ECHO -1, 0, 1, 2; ERRE FATAL, NORMAL, CONTROLE or IGNORE; LANG FRAN "
+                       "or ANGL; SORT, SAUV, REST, FTRA, ACQU names of files. `VALE` reads them.",
+                example="OPTI DIME 3 ELEM CUB8 MODE TRID ;", see=["VALEUR"])
+
+
+@OPTI.stream(*(Key(word, "", Arg("value", ANY)) for word in OPTIONS), syntax="word value (word value)...")
+def _opti(ctx: Context, q: Operands) -> None:
+    if not q.values:
+        ctx.fail(533, "an option is wanted", hint="OPTI DIME 3 ELEM CUB8 ;")
+    while q.values:
+        i = q.first_word()
+        if i != 0:
+            label = q.describe(0)
+            ctx.fail(7, "the name of an option is wanted before this {type}", type=type_of(q.values[0]),
+                     hint="options come in pairs: OPTI DIME 3 ;") if label else None
+        word, node = q.values[0], q.nodes[0]
+        name = str(word)[:4] if isinstance(word, str) else ""
+        if name not in OPTIONS:
+            close = nearest(str(word)[:8], sorted(OPTIONS))
+            ctx.places["word"] = node
+            ctx.fail(7, "unknown option '{word}'", at="word", word=word, close=close,
+                     hint="did you mean '{close}'?" if close else "INFO OPTI ; lists the options")
+        del q.values[0], q.nodes[0]
+        ctx.places["value"] = q.nodes[0] if q.nodes else node
+        value = OPTIONS[name](ctx, q)
+        for listener in ctx.session.listeners.get(name, []):
+            value = listener(ctx, value)
+        ctx.session.options[name] = value
+
+
+VALE = operator("VALEUR", topic="language", summary="value of an option", terminal=True,
+                notice="Reads an option: DIME, ELEM, MODE, DENS, ECHO, ERRE. 'ERMA' is the highest error level so far.",
+                example="OPTI DIME 2 ; MESS (VALE DIME) ;", see=["OPTION"])
+
+
+@VALE.stream(*(Key(word, "") for word in OPTIONS), Key("ERMA", "highest error level so far"), syntax="option:MOT")
+def _vale(ctx: Context, q: Operands) -> Any:
+    word = q.need_keyword([*OPTIONS, "ERMA"])
+    if word == "ERMA":
+        return ctx.session.worst
+    value = ctx.session.options.get(word)
+    if value is None:
+        ctx.fail(19, "the option {word} has no value yet", word=word)
+    return value
+
+
+TITR = operator("TITRE", topic="output", summary="title of the pictures that follow",
+                notice="Joins its operands as MESS does; TRAC and DESS write it over their pictures.",
+                example="TITRE 'two blocks, mu = ' 0.2 ;", see=["OPTION"])
+
+
+@TITR.stream(syntax="x...")
+def _titre(ctx: Context, q: Operands) -> None:
+    from gibiane.builtins.text import compose
+
+    ctx.session.options["TITR"] = compose(ctx, q).strip()
+
+
+TEMP = operator("TEMPS", topic="language", summary="time since the start, or since the last call",
+                notice="`TEMPS ;` prints the seconds since the session began and starts the clock again; "
+                       "`X = TEMPS 'HORL'` gives the seconds since the clock was last started, as a FLOTTANT.",
+                example="TEMPS 'ZERO' ; X = TEMPS 'HORL' ; MESS (X < 10.) ;")
+
+
+@TEMP.form(Key(("HORLOGE", "ZERO", "IMPR", "NOEC"), "read, restart or print the clock", name="what", repeat=True),
+           gives=["FLOTTANT"])
+def _temps(ctx: Context, what: list[str]) -> float | None:
+    now = time.perf_counter()
+    since = ctx.state.get("clock", ctx.session.started)
+    if "HORLOGE" in what:
+        return now - since
+    if "ZERO" not in what and "NOEC" not in what:
+        ctx.write(f" TEMPS ECOULE : {now - ctx.session.started:.2f} s DONT {now - since:.2f} s")
+    ctx.state["clock"] = now
+    return None
+
+
+INFO = operator("INFO", topic="language", summary="describe an operator", terminal=True,
+                notice="Prints the forms, operands, keywords and an example of an operator.", example="INFO MESS ;")
+
+
+@INFO.stream(syntax="name")
+def _info(ctx: Context, q: Operands) -> None:
+    from gibiane.notice import notice
+
+    node = q.nodes[0] if q.nodes else None
+    if node is None:
+        ctx.fail(533, "the name of an operator is wanted", hint="INFO MESS ;")
+    value, _ = q.take((ANY,))
+    word = getattr(node, "word", None) or (value if isinstance(value, str) else "")
+    ctx.write(notice(ctx, word, node))

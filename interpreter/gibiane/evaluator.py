@@ -1,0 +1,366 @@
+"""The evaluator: instructions, elementary groups, assignment, and the queue of typed values.
+
+A group is evaluated by one rule: its first word, if it is an operator, reads operands from the queue and puts its
+results in front; this repeats until the first word is no operator or none is left. There is no precedence.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gibiane import control, objects, procedures
+from gibiane.binding import ABSENT, DOT, PERCENT, Mark, Operands
+from gibiane.diagnostics import FATAL, GibianeError, make, nearest
+from gibiane.frames import Frame
+from gibiane.nodes import Access, Group, Instr, Literal, Name, Node, Target
+from gibiane.registry import Operator, find, names
+from gibiane.source import SourceText, Span
+from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Procedure, Table, Texte, type_of
+
+if TYPE_CHECKING:
+    from gibiane.session import Session
+
+KEEPS_TEXT = frozenset({"TYPE", "TEXTE", "LISTER", "EXISTE", "EGA", "NEG"})
+
+
+class Evaluator:
+    """Runs programs in the frames of one session."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.frame: Frame = Frame(None, None)
+        self.current: Instr | None = None
+        self._echoed: tuple[SourceText | None, int] = (None, 0)
+
+    # -- programs -----------------------------------------------------------------------------------------
+
+    def run(self, program: list[Instr]) -> None:
+        """Run a program in the current frame, echoing its lines when OPTI ECHO asks for it."""
+        self.session.library.forget_absent()
+        self.execute(program, 0, len(program), echo=True)
+
+    def execute(self, program: list[Instr], pc: int, end: int, *, echo: bool = False) -> None:
+        """Run instructions [pc, end) of a program; control instructions move `pc`."""
+        frame = self.frame
+        handlers = control.HANDLERS
+        while pc < end:
+            instr = program[pc]
+            self.current = instr
+            if echo and self.session.options["ECHO"] >= 1:
+                self._echo(instr)
+            try:
+                if instr.bad is not None:
+                    raise GibianeError(instr.bad)
+                if instr.head is None:
+                    self.instruction(instr)
+                    pc += 1
+                else:
+                    pc = handlers[instr.head](self, program, pc)
+            except GibianeError as failure:
+                self.frame = frame
+                self._failed(instr, failure)
+                pc += 1
+
+    def _failed(self, instr: Instr, failure: GibianeError) -> None:
+        """Give the targets no value; stop, or go on when OPTI ERRE says so."""
+        diag = failure.diagnostic
+        if diag.span is None:
+            diag.span = instr.span()
+        for target in instr.targets:
+            if not target.path:
+                self.assign_name(target.name, NOTHING, instr)
+        mode = self.session.options["ERRE"]
+        if mode in ("IGNO", "CONT") and diag.level < FATAL and not self.session.interactive:
+            self.session.worst = max(self.session.worst, diag.level)
+            if mode == "IGNO":
+                self.session.emit(diag)
+            return
+        raise failure
+
+    def unwind(self) -> None:
+        """Return to the session's own frame after a stop, closing what was open."""
+        self.frame = self.session.globals
+        self.frame.loops.clear()
+
+    def _echo(self, instr: Instr) -> None:
+        source, shown = self._echoed
+        if source is not instr.source:
+            source, shown = instr.source, 0
+        last = instr.source.locate(max(instr.end - 1, instr.start))[0]
+        for number in range(shown + 1, last + 1):
+            line = instr.source.line(number)
+            self.session.write(f" $  * {line} " if line else " $  *   ")
+        self._echoed = source, max(shown, last)
+
+    # -- instructions -------------------------------------------------------------------------------------
+
+    def instruction(self, instr: Instr) -> None:
+        """Run a directive or an assignment."""
+        q = self.operands(instr.source, instr.items)
+        targets = instr.targets
+        self.evaluate(q, len(targets))
+        if not targets:
+            if len(q.values) > 1:
+                raise self.leftover(q, 1)
+            if len(q.values) == 1 and self.session.options["WARN"]:
+                self._warn_lonely_word(q)
+            return
+        results = [self._result_for(target, q, instr) for target in targets]
+        if q.values:
+            raise self.leftover(q, 0)
+        for target, value in zip(targets, results, strict=True):
+            self.assign(target, value, instr)
+
+    def _result_for(self, target: Target, q: Operands, instr: Instr) -> Any:
+        wanted: tuple[str, ...] = (ANY,) if target.type_name is None else (target.type_name,)
+        value, _ = q.take(wanted)
+        if value is not ABSENT:
+            return value
+        if target.type_name is not None:
+            label = [q.describe(0, target.type_name)] if q.values else []
+            raise GibianeError(make(37, "no {type} among the results for {name}", type=target.type_name,
+                                    name=target.name, span=instr.at(target), labels=label))
+        if q.values and isinstance(q.values[0], Mark):
+            raise self.stray_access(q, 0)
+        raise GibianeError(make(37, "no result is left for {name}", name=target.name, span=instr.at(target),
+                                hint="the right side gives fewer results than there are names"))
+
+    def assign(self, target: Target, value: Any, instr: Instr) -> None:
+        """Bind a value to a target: a name, a table element, or an attribute of an object."""
+        if target.member:
+            self.frame.this.attributes[target.name] = value
+            return
+        if not target.path:
+            self.assign_name(target.name, value, instr)
+            if self.session.options["WARN"]:
+                self._warn_hidden_operator(target, instr)
+            return
+        container = self.frame.lookup(target.name)
+        for step, (_, index) in enumerate(target.path):
+            if not isinstance(container, Table):
+                shown = type_of(container) if container is not ABSENT else "MOT"
+                raise GibianeError(make(
+                    315, "{name} is a {type}, not a TABLE: it has no elements to assign", name=target.name,
+                    type=shown, span=instr.at(target), hint="make the table first: {name} = TABL ;"))
+            key = self.index_value(instr.source, index)
+            if step == len(target.path) - 1:
+                container.set(key, value)
+            else:
+                container = self._element(container, key, instr.at(index))
+
+    def assign_name(self, name: str, value: Any, instr: Instr | None) -> None:
+        """Bind a name in the current frame."""
+        frame = self.frame
+        frame.names[name] = value
+        if instr is not None:
+            frame.origins[name] = instr
+
+    def index_value(self, source: SourceText, node: Node) -> Any:
+        """Return the value of a table index on the left of `=`."""
+        if isinstance(node, Group):
+            value = self.group(source, node)
+            if value is ABSENT:
+                raise GibianeError(make(1043, "this index gives no value", span=Span(source, node.start, node.end)))
+            return value
+        return self.word(node) if isinstance(node, Name) else node.value  # type: ignore[attr-defined]
+
+    # -- values -------------------------------------------------------------------------------------------
+
+    def word(self, node: Name) -> Any:
+        """Resolve a word: a visible object, else a procedure in a file, else the word itself."""
+        value = self.frame.lookup(node.name)
+        if value is not ABSENT:
+            return value
+        word = node.word
+        op = find(word)
+        if op is not None and word in (op.name, op.name[:4]):
+            return word
+        found = procedures.load(self, word)
+        return word if found is None else found
+
+    def operands(self, source: SourceText, items: list[Node]) -> Operands:
+        """Resolve the items of a group, evaluating inner groups first, into a queue."""
+        values: list[Any] = []
+        nodes: list[Node] = []
+        for item in items:
+            kind = type(item)
+            if kind is Name:
+                value = self.word(item)  # type: ignore[arg-type]
+            elif kind is Literal:
+                value = item.value  # type: ignore[attr-defined]
+            elif kind is Group:
+                value = self.group(source, item)  # type: ignore[arg-type]
+                if value is ABSENT:
+                    continue
+            else:
+                value = DOT if isinstance(item, Access) and item.symbol == "." else PERCENT
+            values.append(value)
+            nodes.append(item)
+        return Operands(self.session, source, values, nodes)
+
+    def group(self, source: SourceText, node: Group) -> Any:
+        """Evaluate a parenthesis; return its one result, or ABSENT when it gives none."""
+        q = self.operands(source, node.items)
+        self.evaluate(q, 1)
+        if not q.values:
+            return ABSENT
+        if len(q.values) > 1:
+            raise self.leftover(q, 1)
+        return q.values[0]
+
+    def evaluate(self, q: Operands, n_targets: int) -> None:
+        """Apply the evaluation rule to a queue until no operator is left to run."""
+        while True:
+            if DOT in q.values or PERCENT in q.values:
+                self.resolve_accesses(q)
+            i = q.first_word()
+            op: Operator | None = None
+            if i >= 0 and type(q.values[i]) is str:
+                op = find(q.values[i])
+            if op is None or op.name not in KEEPS_TEXT:
+                expanded = self._expand_texts(q)
+                if expanded:
+                    continue
+            if i < 0:
+                break
+            node = q.nodes[i]
+            if op is None:
+                if isinstance(q.values[i], Procedure):
+                    procedure = q.values.pop(i)
+                    del q.nodes[i]
+                    procedures.call(self, procedure, q, node)
+                    continue
+                break
+            del q.values[i], q.nodes[i]
+            try:
+                op.run(self.session, q, node)
+            except GibianeError as failure:
+                diag = failure.diagnostic
+                if diag.operator is None and not diag.trace:
+                    diag.operator = op.name
+                if diag.span is None:
+                    diag.span = q.span(node)
+                raise
+            if op.terminal:
+                break
+        if n_targets <= 1 and self.session.point_maker is not None:
+            self.make_point(q, self.session.options["DIME"])
+
+    def make_point(self, q: Operands, dim: int) -> None:
+        """Make a point of two or three bare numbers left in a queue (OPTI DIME 2 or 3)."""
+        if dim < 2:
+            return
+        first, node = q.take((ENTIER, FLOTTANT))
+        if first is ABSENT:
+            return
+        second, _ = q.take((ENTIER, FLOTTANT))
+        if second is ABSENT:
+            q.push_front([first], node)
+            return
+        coordinates = [first, second]
+        if dim == 3:
+            third, _ = q.take((ENTIER, FLOTTANT))
+            if third is ABSENT:
+                raise GibianeError(make(37, "a point in space has three coordinates; only two numbers are here",
+                                        span=q.span(node), hint="write the third, or OPTI DIME 2"))
+            coordinates.append(third)
+        q.push_front([self.session.point_maker(coordinates)], node)
+
+    def resolve_accesses(self, q: Operands) -> None:
+        """Replace `TABLE . index` by the element, from left to right, and call methods for `OBJET % name`."""
+        i = 0
+        while i < len(q.values):
+            mark = q.values[i]
+            if mark is PERCENT:
+                i = objects.resolve(self, q, i)
+                continue
+            if mark is DOT and i and isinstance(q.values[i - 1], Table):
+                if i + 1 == len(q.values):
+                    raise GibianeError(make(1043, "an index is missing after .", span=q.span(q.nodes[i])))
+                value = self._element(q.values[i - 1], q.values[i + 1], q.span(q.nodes[i + 1]))
+                q.values[i - 1 : i + 2] = [value]
+                del q.nodes[i : i + 2]
+                continue
+            i += 1
+
+    def _element(self, table: Table, index: Any, span: Span) -> Any:
+        try:
+            return table.get(index)
+        except GibianeError as failure:
+            failure.diagnostic.span = span
+            raise
+
+    def _expand_texts(self, q: Operands) -> bool:
+        for i, value in enumerate(q.values):
+            if isinstance(value, Texte):
+                inner = self.operands(value.source, value.items)
+                node = q.nodes[i]
+                q.values[i : i + 1] = inner.values
+                q.nodes[i : i + 1] = [node] * len(inner.values)
+                return True
+        return False
+
+    # -- what is wrong -------------------------------------------------------------------------------------
+
+    def stray_access(self, q: Operands, i: int) -> GibianeError:
+        """Return the error for a separator whose left side has no elements."""
+        if i:
+            label = q.describe(i - 1)
+            return GibianeError(make(11, "only a TABLE has elements", labels=[label], span=label.span))
+        return GibianeError(make(11, "nothing stands before this separator", span=q.span(q.nodes[i])))
+
+    def leftover(self, q: Operands, used: int) -> GibianeError:
+        """Return the error 11 for the first value that nothing has read."""
+        for i, value in enumerate(q.values):
+            if isinstance(value, Mark):
+                return self.stray_access(q, i)
+        at = min(used, len(q.values) - 1)
+        word = q.first_word()
+        if word >= 0 and isinstance(q.values[word], str) and isinstance(q.nodes[word], Name | Literal):
+            at = word
+        label = q.describe(at)
+        value, node = q.values[at], q.nodes[at]
+        hint, close = None, None
+        if isinstance(value, str) and isinstance(node, Name) and value == node.word:
+            known = [*names(), *self.session.names(), *self.session.library.names()]
+            close = nearest(value, known)
+            hint = "did you mean {close}?" if close else (
+                "no operator, procedure or object has this name: is it misspelt, or defined later?")
+        elif isinstance(value, str) and find(value) is not None:
+            hint = "an operator that follows EXTR, TYPE, CHAI, MOT, LIST or VALE needs parentheses around these"
+        elif len(q.values) > 1 and all(type_of(v) in (ENTIER, FLOTTANT) for v in q.values):
+            hint = "an operator is missing between the values, or a ; between two instructions"
+        return GibianeError(make(11, "a result of type {type} is left over", type=type_of(value), labels=[label],
+                                 span=label.span, hint=hint, close=close))
+
+    def _warn_lonely_word(self, q: Operands) -> None:
+        node = q.nodes[0]
+        if isinstance(node, Name) and q.values[0] == node.word:
+            known = [*names(), *self.session.names()]
+            close = nearest(node.word, known)
+            self.session.emit(make("G301", "the word {word} does nothing: no object or operator has this name",
+                                   word=node.word, span=q.span(node), close=close,
+                                   hint="did you mean {close}?" if close else None))
+
+    def _warn_hidden_operator(self, target: Target, instr: Instr) -> None:
+        op = find(target.name)
+        if op is not None and len(target.name) >= min(4, len(op.name)):
+            self.session.emit(make("G301", "the name {name} now hides the operator {operator}", name=target.name,
+                                   operator=op.name, span=instr.at(target),
+                                   hint="quote the operator to call it all the same: '{short}'", short=op.name[:4]))
+
+    # -- procedures ------------------------------------------------------------------------------------------
+
+    def call_values(self, procedure: Any, arguments: list[Any], span: Span) -> list[Any]:
+        """Call a procedure (object or name) with given values, for an operator."""
+        if isinstance(procedure, str):
+            found = self.frame.lookup(procedure.upper())
+            if not isinstance(found, Procedure):
+                found = procedures.load(self, procedure.upper())
+            if found is None:
+                raise GibianeError(make(9, "there is no procedure {name}", name=procedure, span=span))
+            procedure = found
+        node = Node(span.start, span.end)
+        q = Operands(self.session, span.source, arguments, [node] * len(arguments))
+        procedures.call(self, procedure, q, node)
+        return q.values

@@ -1,0 +1,70 @@
+"""Frames: the names, loops and pending results of one procedure call."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from gibiane.binding import ABSENT, Operands
+from gibiane.nodes import Instr
+from gibiane.values import Procedure
+
+
+class Stop(Exception):
+    """The run ends here: FIN."""
+
+
+class Loop:
+    """An active REPE block."""
+
+    __slots__ = ("count", "end", "limit", "name", "start")
+
+    def __init__(self, name: str, start: int, end: int, limit: int) -> None:
+        self.name = name
+        self.start = start
+        self.end = end
+        self.limit = limit
+        self.count = 1
+
+
+class Frame:
+    """The names of one call (or of the session), on top of the caller's."""
+
+    __slots__ = ("arguments", "depth", "loops", "names", "origins", "parent", "procedure", "quitting", "results", "this")
+
+    def __init__(self, parent: Frame | None, procedure: Procedure | None) -> None:
+        self.parent = parent
+        self.procedure = procedure
+        self.names: dict[str, Any] = {}
+        self.origins: dict[str, Instr] = {}
+        self.loops: list[Loop] = []
+        self.results: list[Any] = []
+        self.arguments: Operands | None = None
+        self.this: Any = None
+        self.quitting = False
+        self.depth: int = 0 if parent is None else parent.depth + 1
+
+    def lookup(self, name: str) -> Any:
+        """Return the value of a name seen from here, or ABSENT; names with `!` are seen in their own call only."""
+        frame: Frame | None = self
+        while frame is not None:
+            value = frame.names.get(name, ABSENT)
+            if value is not ABSENT or name[0] == "!":
+                return value
+            frame = frame.parent
+        return ABSENT
+
+    def origin(self, name: str) -> int | None:
+        """Return the line that gave a visible name its value."""
+        frame: Frame | None = self
+        while frame is not None:
+            if name in frame.names:
+                instr = frame.origins.get(name)
+                return instr.span().line if instr is not None else None
+            frame = frame.parent
+        return None
+
+    def visible(self) -> dict[str, Any]:
+        """Return every visible name with its value."""
+        found = {} if self.parent is None else self.parent.visible()
+        found.update(self.names)
+        return found

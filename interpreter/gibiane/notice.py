@@ -1,0 +1,101 @@
+"""Three readers of the declarations: the text of INFO, OPERATORS.md, and the words for completion."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import Any
+
+from gibiane import registry
+from gibiane.diagnostics import nearest
+from gibiane.registry import Context, Operator
+
+WIDTH = 100
+
+
+def describe(op: Operator) -> str:
+    """Return the notice of an operator as plain text."""
+    lines = [f"{op.name}: {op.summary}", ""]
+    lines.extend("   " + form.usage(op.name) for form in op.all_forms())
+    operands = {a.name: (a, "|".join(a.types)) for f in op.forms for a in f.args if a.doc}
+    keys = {k.words: k for f in op.forms for k in f.keys if k.doc}
+    if operands or keys:
+        lines.append("")
+    lines.extend(f"   {name:<12} {types:<20} {arg.doc}".rstrip() for name, (arg, types) in operands.items())
+    for words, key in keys.items():
+        shown = "|".join(f"'{w}'" for w in words)
+        lines.append(f"   {shown:<12} {'':<20} {key.doc}".rstrip())
+    if op.notice:
+        lines.extend(["", *textwrap.wrap(op.notice, WIDTH)])
+    if op.example:
+        lines.extend(["", "Example:", *("   " + line for line in op.example.splitlines())])
+    if op.see:
+        lines.extend(["", "See also: " + ", ".join(op.see)])
+    if op.source:
+        lines.append(f"Source: {op.source}")
+    return "\n".join(lines)
+
+
+def notice(ctx: Context, word: str, node: Any) -> str:
+    """Return the notice that INFO prints for a word."""
+    op = registry.find(word)
+    if op is not None:
+        return describe(op)
+    known = registry.names()
+    close = nearest(word, known)
+    ctx.places["word"] = node
+    ctx.fail(9, "there is no operator {word}", at="word", word=word, close=close,
+             hint="did you mean {close}?" if close else "gibiane docs lists the operators")
+
+
+def operators() -> list[Operator]:
+    """Return every operator, loaded, by topic and name."""
+    found = {id(op): op for name in registry.names() if (op := registry.find(name)) is not None}
+    for op in found.values():
+        op.all_forms()
+    return sorted(found.values(), key=lambda op: (op.topic, op.name))
+
+
+def markdown() -> str:
+    """Return OPERATORS.md: every operator with its forms, keywords and example."""
+    lines = ["# Operators", "", "Made from the declarations by `gibiane docs`; do not edit.", ""]
+    ops = operators()
+    topics = sorted({op.topic for op in ops})
+    for topic in topics:
+        links = ", ".join(f"[{op.name}](#{_anchor(op.name)})" for op in ops if op.topic == topic)
+        lines.append(f"- **{topic}**: {links}")
+    for topic in topics:
+        lines.extend(["", f"## {topic}"])
+        for op in ops:
+            if op.topic == topic:
+                lines.extend(_section(op))
+    return "\n".join(lines) + "\n"
+
+
+_SYMBOLS = {"+": "plus", "-": "minus", "*": "times", "/": "over", "**": "power", "<": "less", ">": "more",
+            "<EG": "less-or-equal", ">EG": "more-or-equal"}
+
+
+def _anchor(name: str) -> str:
+    return _SYMBOLS.get(name, name.lower())
+
+
+def _section(op: Operator) -> list[str]:
+    lines = ["", f'### <a id="{_anchor(op.name)}"></a>`{op.name}`', "", f"{op.summary[0].upper()}{op.summary[1:]}.", "",
+             "```"]
+    lines.extend(form.usage(op.name) for form in op.forms)
+    lines.extend(["```", ""])
+    keys = {k.words: k for f in op.forms for k in f.keys if k.doc}
+    for words, key in keys.items():
+        shown = " | ".join(f"`'{w}'`" for w in words)
+        lines.append(f"- {shown}: {key.doc}")
+    if keys:
+        lines.append("")
+    if op.notice:
+        lines.extend([op.notice, ""])
+    if op.example:
+        lines.extend(["```", op.example, "```"])
+    if op.see:
+        lines.extend(["", "See also: " + ", ".join(op.see)])
+    if op.source:
+        lines.extend(["", f"Source: {op.source}."])
+    return lines

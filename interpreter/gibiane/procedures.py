@@ -1,0 +1,187 @@
+"""Procedures: definition, finding by name, call, arguments and results."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from gibiane.binding import ABSENT, Operands
+from gibiane.blocks import annotate, check_structure
+from gibiane.diagnostics import GibianeError, make
+from gibiane.frames import Frame
+from gibiane.nodes import Instr, Literal, Name, Node
+from gibiane.source import Span
+from gibiane.syntax import parse
+from gibiane.values import ANY, FLOTTANT, NOTHING, Parameter, Procedure
+
+if TYPE_CHECKING:
+    from gibiane.evaluator import Evaluator
+
+MAX_DEPTH = 500
+
+
+def _word(node: Node) -> str | None:
+    if isinstance(node, Name):
+        return node.word
+    if isinstance(node, Literal) and isinstance(node.value, str):
+        return str(node.value)
+    return None
+
+
+def parameters(instr: Instr, items: list[Node]) -> list[Parameter]:
+    """Read the declarations `name*'TYPE'` (mandatory) and `name/'TYPE'` (optional) of DEBP and ARGU."""
+    found: list[Parameter] = []
+    i = 0
+    while i < len(items):
+        name = items[i].name if isinstance(items[i], Name) else _word(items[i])  # type: ignore[attr-defined]
+        if name is None or name in ("*", "/"):
+            raise GibianeError(make(37, "the name of an argument is wanted here", span=instr.at(items[i]),
+                                    hint="arguments are declared as NAME*TYPE, or NAME/TYPE when optional"))
+        i += 1
+        mark = _word(items[i]) if i < len(items) else None
+        if mark not in ("*", "/"):
+            found.append(Parameter(name.upper(), None, False, None))
+            continue
+        wanted = _word(items[i + 1]) if i + 1 < len(items) else None
+        if wanted is None:
+            raise GibianeError(make(6, "a type is wanted after {mark}", mark=mark, span=instr.at(items[i])))
+        i += 2
+        subtype = None
+        if i + 1 < len(items) and _word(items[i]) == mark and isinstance(items[i], Literal):
+            subtype = _word(items[i + 1])
+            i += 2
+        found.append(Parameter(name.upper(), wanted[:8].rstrip(), mark == "/", subtype))
+    return found
+
+
+def define(ev: Evaluator, program: list[Instr], pc: int) -> int:
+    """Store the procedure that starts at `pc` under its name; return the index after its FINP."""
+    instr = program[pc]
+    end = instr.jump
+    if end is None:
+        raise GibianeError(make(1134, "this procedure is never closed", operator="DEBPROC", span=instr.span(),
+                                hint="write FINP and its results after the last instruction"))
+    problems = check_structure(program, pc + 1, end)
+    if problems:
+        raise GibianeError(problems[0])
+    items = [item for item in instr.items if _word(item) is not None]
+    if len(items) < 2:
+        raise GibianeError(make(533, "a procedure needs a name", operator="DEBPROC", span=instr.span()))
+    at = instr.items.index(items[1])
+    name = (_word(items[1]) or "").upper()[:24]
+    procedure = Procedure(name, parameters(instr, instr.items[at + 1 :]), program, pc + 1, end)
+    ev.assign_name(name, procedure, instr)
+    return end + 1
+
+
+def load(ev: Evaluator, word: str) -> Procedure | None:
+    """Find the procedure `word` in a file, define everything the file holds in the session, and return it."""
+    if not word[0].isalpha() and word[0] not in "@_":
+        return None
+    source = ev.session.library.find(word)
+    if source is None:
+        return None
+    program = parse(source)
+    annotate(program)
+    outer, ev.frame = ev.frame, ev.session.globals
+    try:
+        pc = 0
+        while pc < len(program):
+            instr = program[pc]
+            if instr.bad is not None:
+                raise GibianeError(instr.bad)
+            if instr.head not in ("DEBP", "DEBM"):
+                raise GibianeError(make(1031, "a procedure file holds procedures only", span=instr.span()))
+            pc = define(ev, program, pc)
+    finally:
+        ev.frame = outer
+    found = ev.session.globals.names.get(word[:24])
+    if not isinstance(found, Procedure):
+        raise GibianeError(make(1031, "{file} does not define the procedure {name}", file=source.name, name=word,
+                                span=program[0].span() if program else None,
+                                hint="the name after DEBP must be the name of the file"))
+    return found
+
+
+def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:
+    """Call a procedure with operands read from the caller's queue; push its results in front."""
+    caller = ev.frame
+    span = q.span(node)
+    if caller.depth >= MAX_DEPTH:
+        raise GibianeError(make("G103", "calls are nested deeper than {limit}: does {name} call itself without end?",
+                                limit=MAX_DEPTH, name=procedure.name, span=span))
+    frame = Frame(caller, procedure)
+    frame.arguments = q
+    instr = ev.current
+    for parameter in procedure.parameters:
+        _read_parameter(frame.names, parameter, q, procedure, span)
+    ev.frame = frame
+    try:
+        ev.execute(procedure.program, procedure.start, procedure.end)
+        final = procedure.program[procedure.end]
+        ev.current = final
+        if final.bad is not None:
+            raise GibianeError(final.bad)
+        frame.results.extend(results_of(ev, final, final.items, skip_undefined=frame.quitting))
+    except GibianeError as failure:
+        failure.diagnostic.trace.append((procedure.name, span))
+        raise
+    finally:
+        ev.frame = caller
+        ev.current = instr
+    q.push_front(frame.results, node)
+
+
+def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, procedure: Procedure,
+                    span: Span) -> None:
+    wanted = (parameter.type_name,) if parameter.type_name else (ANY,)
+    value, _ = q.take(wanted, parameter.subtype)
+    if value is ABSENT:
+        if not parameter.optional:
+            what = parameter.type_name or "value"
+            if parameter.subtype:
+                what = f"{what} {parameter.subtype}"
+            labels = [q.describe(0, parameter.type_name)] if q.values else []
+            diag = make(1121, "argument {argument} is missing: a {what} is wanted", argument=parameter.name, what=what,
+                        operator=procedure.name, span=labels[0].span if labels else span, labels=labels)
+            diag.forms = [usage(procedure)]
+            raise GibianeError(diag)
+        value = NOTHING
+    elif parameter.type_name == FLOTTANT:
+        value = float(value)
+    names[parameter.name] = value
+
+
+def usage(procedure: Procedure) -> str:
+    """Return the header of a procedure as a usage line."""
+    parts = []
+    for p in procedure.parameters:
+        text = f"{p.name.lower()}:{p.type_name}" if p.type_name else p.name.lower()
+        parts.append(f"({text})" if p.optional else text)
+    return " ".join([procedure.name, *parts, ";"])
+
+
+def results_of(ev: Evaluator, instr: Instr, items: list[Node], *, skip_undefined: bool = False) -> list[Any]:
+    """Evaluate the operands of FINP or RESP: everything they leave is a result."""
+    if items and items is instr.items:
+        items = [i for n, i in enumerate(items) if n != _head_position(instr)]
+    q = ev.operands(instr.source, items)
+    if skip_undefined:
+        kept = [i for i, (v, n) in enumerate(zip(q.values, q.nodes, strict=True))
+                if not (isinstance(n, Name) and v == n.word)]
+        q.values, q.nodes = [q.values[i] for i in kept], [q.nodes[i] for i in kept]
+    ev.evaluate(q, 2)  # two targets or more: bare numbers are results, not a point
+    return q.values
+
+
+def _head_position(instr: Instr) -> int:
+    return next(n for n, i in enumerate(instr.items) if (_word(i) or "")[:4] == instr.head)
+
+
+def read_arguments(ev: Evaluator, instr: Instr, items: list[Node]) -> None:
+    """Run ARGU: read more arguments from what is still unread in the caller's queue."""
+    frame = ev.frame
+    if frame.procedure is None or frame.arguments is None:
+        raise GibianeError(make(153, "ARGUMENT stands inside a procedure only", operator="ARGUMENT",
+                                span=instr.span()))
+    for parameter in parameters(instr, items):
+        _read_parameter(frame.names, parameter, frame.arguments, frame.procedure, instr.span())

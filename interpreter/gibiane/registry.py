@@ -1,0 +1,271 @@
+"""One declaration per operator: dispatch, usage lines, INFO, completion and the registry test read it.
+
+    RESO = operator("RESO", topic="resolution", summary="...", notice=\"\"\"...\"\"\", example="U1 = RESO K1 F1 ;")
+
+    @RESO.form(Arg("k", RIGIDITE, "matrix"), Key("NOID", "skip the check"), gives=[CHPOINT])
+    def _reso(ctx, k, noid): ...
+
+The function's parameters are `ctx` and the names declared, in the same order (a keyword's parameter is its word in
+lower case unless `name` says otherwise); a difference is refused at import.
+"""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from gibiane.binding import Mismatch, Operands, bind, explain
+from gibiane.diagnostics import Diagnostic, GibianeError, Label, Text, make
+from gibiane.forms import Arg, Form, Function, Key
+from gibiane.nodes import Node
+from gibiane.values import ANY
+
+if TYPE_CHECKING:
+    from gibiane.session import Session
+
+
+class Operator:
+    """An operator: its description and its forms, some of them loaded when first needed."""
+
+    def __init__(self, name: str, *, topic: str, summary: str, notice: str, example: str, see: Sequence[str],
+                 source: str, whole: bool, terminal: bool, symbolic: bool) -> None:
+        self.name = name
+        self.topic = topic
+        self.summary = summary
+        self.notice = inspect.cleandoc(notice)
+        self.example = inspect.cleandoc(example)
+        self.see = list(see)
+        self.source = source
+        self.whole = whole
+        self.terminal = terminal
+        self.symbolic = symbolic
+        self.forms: list[Form] = []
+        self.pending: list[str] = []
+        self.fast: Callable[[Any, Any], Any] | None = None
+
+    def form(self, *parts: Arg | Key, gives: Sequence[str] = (), last: bool = False) -> Callable[[Function], Function]:
+        """Declare a form; the decorated function gets the context and the named operands."""
+
+        def declare(function: Function) -> Function:
+            names = list(inspect.signature(function).parameters)
+            expected = ["ctx", *(p.name for p in parts)]
+            if names != expected:
+                raise TypeError(f"{self.name}: parameters {names} differ from the declaration {expected}")
+            self._add(Form(parts, gives, function, stream=False, syntax=None, last=last))
+            return function
+
+        return declare
+
+    def stream(self, *parts: Arg | Key, syntax: str, gives: Sequence[str] = (),
+               last: bool = False) -> Callable[[Function], Function]:
+        """Declare a form that reads the queue itself: the function gets the context and the operands.
+
+        `parts` still lists every keyword, for INFO and completion.
+        """
+
+        def declare(function: Function) -> Function:
+            self._add(Form(parts, gives, function, stream=True, syntax=syntax, last=last))
+            return function
+
+        return declare
+
+    def _add(self, form: Form) -> None:
+        if not form.stream and any(_same_operands(form, other) for other in self.forms if not other.stream):
+            raise TypeError(f"{self.name}: a form with these operands exists already")
+        at = len(self.forms)
+        if not form.last:
+            while at and self.forms[at - 1].last:
+                at -= 1
+        self.forms.insert(at, form)
+
+    def load_more(self) -> bool:
+        """Import the next module that adds forms; say whether there was one."""
+        if not self.pending:
+            return False
+        import_module(self.pending.pop(0))
+        return True
+
+    def all_forms(self) -> list[Form]:
+        """Return every form, loading what is not loaded yet."""
+        while self.load_more():
+            pass
+        return self.forms
+
+    def run(self, session: Session, q: Operands, node: Node) -> None:
+        """Read operands from the queue by the first form that fits, run it, push its results in front."""
+        misses: list[Mismatch] = []
+        i = 0
+        while True:
+            if i < len(self.forms) and not (self.forms[i].last and self.pending):
+                form = self.forms[i]
+                i += 1
+                if form.stream:
+                    ctx = Context(session, self, q, node, {})
+                    result = form.function(ctx, q)
+                else:
+                    bound = bind(form, q)
+                    if isinstance(bound, Mismatch):
+                        misses.append(bound)
+                        continue
+                    ctx = Context(session, self, q, node, bound[1])
+                    result = form.function(ctx, **bound[0])
+                if result is Refused:
+                    continue
+                q.push_front(_results(result), node)
+                return
+            if not self.load_more():
+                raise explain(self, misses, q)
+
+
+class _Refusal:
+    """What a stream form returns, the queue untouched, when the operands are for another form."""
+
+
+Refused = _Refusal()
+
+
+def _results(result: Any) -> Sequence[Any]:
+    if result is None:
+        return ()
+    return result if isinstance(result, tuple) else (result,)
+
+
+def _same_operands(a: Form, b: Form) -> bool:
+    def shape(form: Form) -> tuple[Any, ...]:
+        required = tuple(k.words for k in form.keys if k.required)
+        return tuple((x.types, x.subtype, x.many) for x in form.args if not x.optional), required
+
+    return shape(a) == shape(b)
+
+
+class Context:
+    """What an operator may ask: options, output, warnings, errors about its operands, calls of procedures."""
+
+    __slots__ = ("node", "operands", "operator", "places", "session")
+
+    def __init__(self, session: Session, operator: Operator, operands: Operands, node: Node,
+                 places: dict[str, Node]) -> None:
+        self.session = session
+        self.operator = operator
+        self.operands = operands
+        self.node = node
+        self.places = places
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """The place where operator packages keep what belongs to the session."""
+        return self.session.state
+
+    def option(self, name: str) -> Any:
+        """Return the value of an option (OPTI)."""
+        return self.session.options[name]
+
+    def write(self, line: str) -> None:
+        """Write a line of output."""
+        self.session.write(line)
+
+    def diagnostic(self, code: int | str, template: str, *, at: str | None = None, label: str | None = None,
+                   hint: str | None = None, level: int | None = None, **fields: Any) -> Diagnostic:
+        """Build a diagnostic about operand `at` (a declared name), or about the operator's word."""
+        node = self.places.get(at, self.node) if at else self.node
+        span = self.operands.span(node)
+        labels = [Label(span, Text(label, fields))] if label else []
+        return make(code, template, operator=self.operator.name, span=span, labels=labels, hint=hint, level=level,
+                    **fields)
+
+    def fail(self, code: int | str, template: str, **options: Any) -> NoReturn:
+        """Raise an error; options as for :meth:`diagnostic`."""
+        raise GibianeError(self.diagnostic(code, template, **options))
+
+    def warn(self, code: int | str, template: str, *, level: int = 1, **options: Any) -> None:
+        """Emit a warning (level 1) or a note (level 0)."""
+        self.session.emit(self.diagnostic(code, template, level=level, **options))
+
+    def call(self, procedure: Any, *arguments: Any) -> list[Any]:
+        """Call a procedure (an object or its name) with arguments; return its results."""
+        return self.session.call(procedure, list(arguments), self.operands.span(self.node))
+
+
+CATALOGUE: dict[str, Operator] = {}
+LONG: dict[str, Operator] = {}
+_MODULES: dict[str, list[str]] = {}
+# names that a four-letter key would let clash with words of scripts (MAIL is a variable in hundreds of them)
+WHOLE_NAMES = frozenset({"MAILLER", "LISSER"})
+
+
+def _register(op: Operator) -> Operator:
+    table, key = (LONG, op.name) if op.whole else (CATALOGUE, op.name[:4])
+    if key in table:
+        raise TypeError(f"operator {op.name} is declared twice")
+    table[key] = op
+    return op
+
+
+def operator(name: str, *, topic: str, summary: str, notice: str = "", example: str = "", see: Sequence[str] = (),
+             source: str = "", whole: bool = False, terminal: bool = False) -> Operator:
+    """Declare an operator by its name; the first four letters are its key, or the whole name with `whole`."""
+    return _register(Operator(name, topic=topic, summary=summary, notice=notice, example=example, see=see,
+                              source=source, whole=whole, terminal=terminal, symbolic=False))
+
+
+def infix(name: str, *, topic: str, summary: str, notice: str = "", example: str = "",
+          see: Sequence[str] = ()) -> Operator:
+    """Declare an operator written as a symbol (`+`, `<EG`), or one that errors treat like it (EGA)."""
+    return _register(Operator(name, topic=topic, summary=summary, notice=notice, example=example, see=see, source="",
+                              whole=False, terminal=False, symbolic=True))
+
+
+def extend(name: str) -> Operator:
+    """Return an operator declared elsewhere, to give it further forms."""
+    found = LONG.get(name) or find(name)
+    if found is None:
+        raise TypeError(f"extend({name!r}): no such operator is declared")
+    return found
+
+
+def announce(table: Mapping[str, Sequence[str]]) -> None:
+    """Tell which modules declare (first) and extend (others) operators, without importing them."""
+    for name, modules in table.items():
+        declared = LONG.get(name) or CATALOGUE.get(name[:4])
+        if declared is not None:
+            declared.pending.extend(m for m in modules if m not in declared.pending and m not in sys.modules)
+        else:
+            _MODULES[name] = list(modules)
+    _find_cached.cache_clear()
+
+
+def find(word: str) -> Operator | None:
+    """Return the operator that a word calls: by its first four letters, else by its whole name."""
+    return _find_cached(word)
+
+
+def names() -> list[str]:
+    """Return the names of all operators, declared or announced."""
+    return sorted({op.name for op in CATALOGUE.values()} | set(LONG) | set(_MODULES))
+
+
+@lru_cache(maxsize=4096)
+def _find_cached(word: str) -> Operator | None:
+    key = word[:4].rstrip()
+    if not key:
+        return None
+    found = CATALOGUE.get(key)
+    if found is not None:
+        return found
+    for name, modules in _MODULES.items():
+        if name[:4] == key and (name not in WHOLE_NAMES) or (name in WHOLE_NAMES and word.startswith(name)):
+            import_module(modules[0])
+            declared = CATALOGUE.get(key) or LONG.get(name)
+            if declared is None:
+                raise TypeError(f"{modules[0]} does not declare {name}")
+            del _MODULES[name]
+            declared.pending.extend(m for m in modules[1:] if m not in sys.modules)
+            return declared
+    return next((op for name, op in LONG.items() if word.startswith(name)), None)
+
+
+__all__ = ["ANY", "Arg", "Context", "Form", "Key", "Operator", "Refused", "extend", "infix", "operator"]

@@ -1,0 +1,230 @@
+"""A session: names, options, loaded operators, output. All state of a run lives here, none in modules."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+from gibiane import registry
+from gibiane.blocks import annotate
+from gibiane.diagnostics import ERROR, Diagnostic, GibianeError, make, render
+from gibiane.evaluator import Evaluator
+from gibiane.frames import Frame, Stop
+from gibiane.library import Library
+from gibiane.source import NotText, SourceText, Span, decode
+from gibiane.syntax import parse
+from gibiane.values import Value, type_of
+
+EXIT_CODES = {0: 0, 1: 4, 2: 8, 3: 12}
+INTERNAL_FAILURE, INTERRUPTED = 70, 130
+
+
+def default_options() -> dict[str, Any]:
+    """Return the options of a new session (OPTI)."""
+    return {"DIME": 0, "MODE": None, "ELEM": None, "DENS": 0.0, "ECHO": 0, "ERRE": "NORM", "LANG": None,
+            "WARN": False, "EXEC": False, "STRICT": False}
+
+
+class Session:
+    """Everything a run of scripts shares; `run_text` and `run_file` add to it.
+
+    Parameters
+    ----------
+    out, err : text streams
+        Where output and messages go (standard streams by default). A message flushes `out` first.
+    interactive : bool
+        True in a REPL: errors keep the session, warnings about likely mistakes are on.
+    colour : bool
+        Colour in messages.
+    """
+
+    def __init__(self, *, out: TextIO | None = None, err: TextIO | None = None, interactive: bool = False,
+                 colour: bool = False) -> None:
+        self.out = out if out is not None else sys.stdout
+        self.err = err if err is not None else sys.stderr
+        self.interactive = interactive
+        self.colour = colour
+        self.debug = False
+        self.options = default_options()
+        self.options["WARN"] = interactive
+        self.state: dict[str, Any] = {}
+        self.listeners: dict[str, list[Any]] = {}
+        self.point_maker: Any = None
+        self.library = Library()
+        self.worst = 0
+        self.internal = False
+        self.finished = False
+        self.started = time.perf_counter()
+        self._ordinals: dict[int, tuple[int, Any]] = {}
+        self.evaluator = Evaluator(self)
+        self.globals = Frame(None, None)
+        self.globals.names.update({"VRAI": True, "FAUX": False, "D": "DROI", "C": "CERC"})
+        self.evaluator.frame = self.globals
+        load_operators(self)
+
+    # -- output ---------------------------------------------------------------------------------------------
+
+    @property
+    def lang(self) -> str:
+        """Language of diagnostics: English unless OPTI LANG says otherwise."""
+        return "fr" if self.options["LANG"] == "FRAN" else "en"
+
+    def write(self, line: str) -> None:
+        """Write one line of output."""
+        self.out.write(line + "\n")
+
+    def emit(self, diagnostic: Diagnostic) -> None:
+        """Show a message of any level and remember the highest."""
+        self.worst = max(self.worst, diagnostic.level)
+        if diagnostic.level < ERROR and (diagnostic.level == 0 and self.options["ECHO"] < 0):
+            return
+        self.out.flush()
+        self.err.write(render(diagnostic, colour=self.colour, lang=self.lang) + "\n")
+        self.err.flush()
+
+    # -- what operators and the evaluator ask ------------------------------------------------------------------
+
+    def operator(self, word: str) -> registry.Operator | None:
+        """Return the operator that `word` calls, or None."""
+        return registry.find(word)
+
+    def origin(self, name: str) -> int | None:
+        """Return the line where a visible name was last given its value, or None."""
+        return self.evaluator.frame.origin(name)
+
+    def ordinal(self, value: Value) -> int:
+        """Return a small number that stands for an object in listings (Cast3M prints a pointer)."""
+        found = self._ordinals.get(id(value))
+        if found is None:
+            found = len(self._ordinals) + 1, value
+            self._ordinals[id(value)] = found
+        return found[0]
+
+    def brief(self, value: Any) -> str:
+        """Return a value in a few characters, for listings."""
+        if isinstance(value, bool):
+            return "VRAI" if value else "FAUX"
+        if isinstance(value, float):
+            from gibiane.fortran import general
+
+            return general(value).strip()
+        if isinstance(value, int | str):
+            return str(value)
+        return str(self.ordinal(value))
+
+    def call(self, procedure: Any, arguments: list[Any], span: Span) -> list[Any]:
+        """Call a procedure (an object or its name) from an operator; return its results."""
+        return self.evaluator.call_values(procedure, arguments, span)
+
+    # -- running --------------------------------------------------------------------------------------------
+
+    def run_text(self, text: str, name: str = "<text>", directory: str | None = None) -> int:
+        """Run a script given as text; return the exit code of the session so far."""
+        return self._run(SourceText(name, text, directory))
+
+    def run_file(self, path: str | Path) -> int:
+        """Run a script file; return the exit code of the session so far."""
+        source = self.open(path)
+        return EXIT_CODES[self.worst] if source is None else self._run(source)
+
+    def open(self, path: str | Path) -> SourceText | None:
+        """Read a script file; a missing or unreadable one is a diagnostic and None."""
+        path = Path(path)
+        try:
+            data = path.read_bytes()
+        except IsADirectoryError:
+            self.emit(make(1130, "{path} is a folder, not a script", path=path.as_posix()))
+            return None
+        except OSError as failure:
+            close = _similar_file(path)
+            reason = failure.strerror or "cannot be read"
+            self.emit(make(1130, "the script {path} cannot be opened ({reason})", path=path.as_posix(),
+                           reason=reason.lower(), hint="did you mean {close}?" if close else None, close=close))
+            return None
+        try:
+            return SourceText(path.as_posix(), decode(data), str(path.parent))
+        except NotText as failure:
+            self.emit(make("G101", "{path} is not a text file (a NUL byte at offset {offset})", path=path.as_posix(),
+                           offset=failure.offset))
+            return None
+
+    def _run(self, source: SourceText) -> int:
+        program = parse(source)
+        annotate(program)
+        previous = self.library.directory
+        if source.directory is not None:
+            self.library.directory = source.directory
+        try:
+            self.evaluator.run(program)
+        except Stop:
+            self.finished = True
+        except GibianeError as failure:
+            self.emit(failure.diagnostic)
+        except RecursionError:
+            self.emit(make("G103", "calls or parentheses are nested too deeply"))
+        except KeyboardInterrupt:
+            if not self.interactive:
+                raise
+            self.out.flush()
+            self.err.write("interrupted; every object is kept\n")
+        except Exception as failure:
+            self._internal(failure)
+        finally:
+            self.library.directory = previous
+            self.evaluator.unwind()
+            self.out.flush()
+        return INTERNAL_FAILURE if self.internal else EXIT_CODES[self.worst]
+
+    def _internal(self, failure: Exception) -> None:
+        """Turn an unforeseen Python error into G900: the user gets a sentence, --debug the traceback."""
+        self.internal = True
+        instr = self.evaluator.current
+        self.emit(make("G900", "internal failure: {kind}: {text}", kind=type(failure).__name__, text=str(failure),
+                       span=instr.span() if instr is not None else None,
+                       hint="this is a fault of the program: please report it with this script (--debug shows more)"))
+        if self.debug:
+            raise failure
+
+    def names(self) -> dict[str, Any]:
+        """Return every visible name with its value."""
+        return self.evaluator.frame.visible()
+
+    def listing(self, value: Any, *, brief: bool = False, width: int | None = None) -> Sequence[str]:
+        """Return the lines that LIST prints for a value that is not a scalar."""
+        if not isinstance(value, Value):
+            raise TypeError(type_of(value))
+        return list(value.listing(self, brief, width))
+
+
+def load_operators(session: Session) -> None:
+    """Announce the operators of every installed package, without importing what they need."""
+    import gibiane.builtins  # noqa: F401  (declares the operators of the language itself)
+
+    for package in _packages():
+        package.setup(session)
+
+
+def _packages() -> list[Any]:
+    from importlib.util import find_spec
+
+    found: dict[str, Any] = {}
+    if find_spec("gibiane_ops") is not None:
+        from importlib import import_module
+
+        found["gibiane_ops"] = import_module("gibiane_ops")
+    return list(found.values())
+
+
+def _similar_file(path: Path) -> str | None:
+    from gibiane.diagnostics import nearest
+
+    if not path.parent.is_dir():
+        return None
+    names = [p.name for p in path.parent.iterdir() if p.is_file()]
+    close = nearest(path.name, names, 3)
+    if close is None and path.name + ".dgibi" in names:
+        close = path.name + ".dgibi"
+    return (path.parent / close).as_posix() if close else None

@@ -1,0 +1,211 @@
+"""Tokens to instructions: one instruction at a time, each with its own syntax error if it has one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from lark import Lark, Transformer, UnexpectedToken
+from lark.lexer import Lexer
+
+from gibiane.diagnostics import Diagnostic, make
+from gibiane.lexer import Token, tokens
+from gibiane.nodes import Access, Group, Instr, Literal, Name, Node, Target
+from gibiane.source import SourceText, Span
+
+
+class _Ready(Lexer):
+    """A lexer for tokens that are already made."""
+
+    def __init__(self, _conf: Any) -> None:
+        pass
+
+    def lex(self, data: Iterable[Token]) -> Iterator[Token]:  # type: ignore[override]
+        return iter(data)
+
+
+def _leaf(token: Token) -> Node:
+    if token.type == "NAME":
+        return Name(str(token.value), token.start_pos, token.end_pos)
+    if token.type == "ACCESS":
+        return Access(str(token.value), token.start_pos, token.end_pos)
+    return Literal(token.value, token.start_pos, token.end_pos, quoted=token.type == "STRING")
+
+
+class _Build(Transformer[Token, Any]):
+    """Grammar rules to nodes, applied while parsing."""
+
+    def sequence(self, items: list[Any]) -> list[Node]:
+        return [_leaf(item) if type(item) is Token else item for item in items]
+
+    def group(self, parts: list[Any]) -> Node:
+        return Group(parts[1], parts[0].start_pos, parts[2].end_pos)
+
+    def directive(self, parts: list[Any]) -> tuple[list[Node] | None, list[Node]]:
+        return None, parts[0]
+
+    def assignment(self, parts: list[Any]) -> tuple[list[Node] | None, list[Node]]:
+        return parts[0], parts[2]
+
+
+@cache
+def _parser() -> Lark:
+    grammar = files("gibiane").joinpath("grammar.lark").read_text(encoding="utf-8")
+    return Lark(grammar, parser="lalr", lexer=_Ready, transformer=_Build())
+
+
+class SyntaxFailure(Exception):
+    """A syntax error inside one instruction."""
+
+    def __init__(self, diagnostic: Diagnostic) -> None:
+        super().__init__(diagnostic.sentence.render())
+        self.diagnostic = diagnostic
+
+
+def parse(source: SourceText, start: int = 0) -> list[Instr]:
+    """Parse a source text into instructions; a wrong one carries its diagnostic in `bad`.
+
+    Control words are recognised (`head`); matching them into blocks is the work of :mod:`gibiane.blocks`.
+    """
+    errors: dict[int, Diagnostic] = {}
+    program: list[Instr] = []
+    held: list[Token] = []
+    for token in tokens(source, errors, start):
+        if token.type == "SEMI":
+            program.append(_instruction(source, held, token.end_pos, errors))
+            held = []
+        else:
+            held.append(token)
+    if held:
+        instr = _instruction(source, held, held[-1].end_pos, errors)
+        if instr.bad is None or instr.bad.code == "1":
+            last = Span(source, held[-1].start_pos, held[-1].end_pos)
+            instr.bad = make("G102", "the text ends before the `;` of this instruction", span=last,
+                             hint="close the instruction with ;")
+        program.append(instr)
+    elif errors:
+        program.append(_instruction(source, [], len(source.text), errors))
+    return program
+
+
+def _instruction(source: SourceText, held: list[Token], end: int, errors: dict[int, Diagnostic]) -> Instr:
+    start = held[0].start_pos if held else min(errors, default=end - 1)
+    instr = Instr(source, start, end, [], [])
+    lexical = [at for at in errors if at < end]
+    try:
+        left, items = _grouped(source, held)
+        instr.items = items
+        if left is not None:
+            instr.targets = _targets(source, left, held)
+    except SyntaxFailure as failure:
+        instr.bad = failure.diagnostic
+        instr.items = [_leaf(t) for t in held if t.type in ("NAME", "STRING", "NUMBER")]
+    if lexical:
+        instr.bad = errors[min(lexical)]
+        for at in lexical:
+            del errors[at]
+    if not instr.targets:
+        instr.head = _head(instr.items)
+    return instr
+
+
+def _grouped(source: SourceText, held: list[Token]) -> tuple[list[Node] | None, list[Node]]:
+    try:
+        result: tuple[list[Node] | None, list[Node]] = _parser().parse(held)  # type: ignore[arg-type, assignment]
+    except UnexpectedToken as failure:
+        raise SyntaxFailure(_explain(source, held, failure.token)) from None
+    return result
+
+
+def _explain(source: SourceText, held: list[Token], bad: Any) -> Diagnostic:
+    """Name the mistake from the token the parser stopped at."""
+    depth: list[Token] = []
+    equals = 0
+    for token in held:
+        if token is bad:
+            break
+        if token.type == "LPAR":
+            depth.append(token)
+        elif token.type == "RPAR":
+            depth.pop()
+        elif token.type == "EQUAL":
+            equals += 1
+    if bad.type == "RPAR":
+        return make(2, "this closing parenthesis has no opening one", span=Span(source, bad.start_pos, bad.end_pos),
+                    hint="remove it, or write the missing ( before it")
+    if bad.type == "EQUAL" and equals:
+        return make(1014, "a second = in one instruction", span=Span(source, bad.start_pos, bad.end_pos),
+                    hint="is the ; of the instruction before it missing? To compare two values: A EGA B")
+    if bad.type == "EQUAL":
+        return make(1014, "an = inside a parenthesis", span=Span(source, bad.start_pos, bad.end_pos),
+                    hint="assign in an instruction of its own; to compare two values: A EGA B")
+    opening = depth[-1]
+    return make(1, "this parenthesis is not closed before the end of the instruction",
+                span=Span(source, opening.start_pos, opening.end_pos), hint="write the missing ) before the ;")
+
+
+def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Target]:
+    """Read the left side of `=`: names, each with an optional type mark or a path of indices."""
+    targets: list[Target] = []
+    items = list(left)
+    i = 0
+    while i < len(items):
+        item = items[i]
+        following = items[i + 1] if i + 1 < len(items) else None
+        if isinstance(item, Access) and item.symbol == "%" and isinstance(following, Name):
+            target = Target(following.name, item.start, following.end)
+            target.member = True
+            i += 2
+        elif isinstance(item, Name | Literal) and (isinstance(item, Name) or item.quoted):
+            name = item.name if isinstance(item, Name) else str(item.value).upper()
+            target = Target(name, item.start, item.end)
+            i += 1
+        else:
+            raise SyntaxFailure(make(315, "this cannot be given a value", span=Span(source, item.start, item.end),
+                                     hint="on the left of = stand names and table elements: A T.'X' = ..."))
+        while i < len(items) and isinstance(access := items[i], Access):
+            if i + 1 == len(items) or isinstance(items[i + 1], Access):
+                raise SyntaxFailure(make(1043, "an index is missing after {symbol}", symbol=access.symbol,
+                                         span=Span(source, access.start, access.end)))
+            target.path.append((access.symbol, items[i + 1]))
+            target.end = items[i + 1].end
+            i += 2
+        if i + 1 < len(items) and isinstance(mark := items[i], Literal) and mark.value == "*" and not mark.quoted:
+            wanted = items[i + 1]
+            if isinstance(wanted, Name):
+                target.type_name = wanted.word[:8]
+            elif isinstance(wanted, Literal) and wanted.quoted:
+                target.type_name = str(wanted.value)[:8]
+            else:
+                raise SyntaxFailure(make(6, "a type is wanted after *", span=Span(source, mark.start, wanted.end)))
+            target.end = wanted.end
+            i += 2
+        if target.name.startswith("#") and not target.path:
+            raise SyntaxFailure(make(315, "names that begin with # are reserved",
+                                     span=Span(source, target.start, target.end)))
+        targets.append(target)
+    if not targets:
+        equal = next(t for t in held if t.type == "EQUAL")
+        raise SyntaxFailure(make(315, "nothing stands before the =", span=Span(source, equal.start_pos, equal.end_pos),
+                                 hint="write the name of the result before it"))
+    return targets
+
+
+CONTROL_HEADS = frozenset("SI SINO FINS REPE FIN QUIT ITER DEBP FINP ARGU RESP DEBM FINM".split())
+
+
+def _head(items: list[Node]) -> str | None:
+    """Return the control word of a directive: its first word, numbers and groups before it skipped."""
+    for item in items:
+        if isinstance(item, Group) or (isinstance(item, Literal) and not isinstance(item.value, str)):
+            continue
+        word = item.word if isinstance(item, Name) else item.value if isinstance(item, Literal) else ""
+        key = word[:4]
+        if key in CONTROL_HEADS:
+            return str(key)
+        if isinstance(item, Name) and any(isinstance(n, Name) and n.word == "SI" for n in items):
+            return "SI"  # `ok SI ;`
+        return None
+    return None
