@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
-
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.report import ContactState
-from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
+from gibiane_ops.kernels.errors import ContactUnbalanced
 
 UNBALANCED = 1e-5
 """Part of the load that may stay unbalanced before the problem is said to have no solution."""
@@ -68,26 +66,23 @@ def unbalanced_load(interface: Interface, mu: FloatArray, *, max_iter: int = 500
     return share, motion / (np.abs(motion).max() or 1.0)
 
 
-def explain_failure(interface: Interface, state: ContactState) -> NoReturn:
-    """Raise the error that says why no solution was found.
+def raise_if_unbalanced(interface: Interface, state: ContactState) -> None:
+    """Raise the error that names the motion which starts, when no contact force can balance the load.
 
     Parameters
     ----------
     interface : Interface
     state : ContactState
-        Best state reached.
+        Best state reached, kept in the error.
 
     Raises
     ------
     ContactUnbalanced
-        When the load cannot be balanced; ``kind`` is ``sliding``, ``tipping`` or ``separation``.
-    NotConverged
-        When it can.
+        ``kind`` is ``sliding``, ``tipping`` or ``separation``.
     """
     share, motion = unbalanced_load(interface, state.mu)
     if share > UNBALANCED:
         raise ContactUnbalanced(kind_of_motion(motion, state.mu), share, motion, state.history, state)
-    raise NotConverged(state.history, state)
 
 
 def kind_of_motion(motion: FloatArray, mu: FloatArray) -> str:

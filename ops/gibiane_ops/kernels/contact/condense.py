@@ -13,10 +13,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
 from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.interface import FREE_LIMIT, Interface
 from gibiane_ops.kernels.contact.pairs import ContactPairs
-from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.contact.ties import tie
+from gibiane_ops.kernels.errors import SingularSystem
 from gibiane_ops.kernels.solve import Factor, factorize
 
 BoolArray = NDArray[np.bool_]
@@ -47,20 +49,19 @@ class Condensation:
     rigid: FloatArray
     _shortening: FloatArray
     _K: sp.csr_array
-    _Bv: sp.csr_array
-    _Bw: sp.csr_array
-    _B0: sp.csr_array
     _Kvw: sp.csr_array
-    _fixed: IntArray
+    _fields: _Fields
+    _reduction: Reduction
 
-    def interface(self, F: FloatArray, values: FloatArray | None = None) -> Interface:
+    def interface(self, F: FloatArray, offset: FloatArray | None = None) -> Interface:
         """Condense a load and prescribed displacements on the pairs.
 
         Parameters
         ----------
         F : (n_dofs,) float64, force
-        values : (n_fixed,) float64, optional
-            Prescribed displacements, in the order of ``fixed`` given to ``condense``; zero when left out.
+        offset : (n_dofs,) float64, optional
+            ``Reduction.offset`` of the same conditions with other prescribed values; those given to ``condense`` when
+            left out.
 
         Returns
         -------
@@ -70,28 +71,26 @@ class Condensation:
         ----
         One solution with the tied matrix.
         """
-        values = np.zeros(len(self._fixed)) if values is None else np.asarray(values, dtype=np.float64)
-        U0 = self._B0 @ values
+        fields = self._fields
+        U0 = fields.constant(self._reduction.offset if offset is None else offset)
         F0 = F - self._K @ U0
-        x0 = self.factor.solve(self._Bv.T @ F0)
-        f = self._Bw.T @ F0 - self._Kvw.T @ x0
-        slave, master = self.contact.pairs.T
-        d = self.active.shape[1]
+        x0 = self.factor.solve(fields.Bv.T @ F0)
+        f = np.asarray(fields.Bw.T @ F0 - self._Kvw.T @ x0)
         # prescribed displacements of both nodes of a pair: part of the gap is already used up
-        offset = (U0.reshape(-1, d)[slave] - U0.reshape(-1, d)[master]) * self.contact.normals
-        gap = (self.contact.gap - offset.sum(axis=1)) / self._shortening
+        d = self.active.shape[1]
+        slave, master = self.contact.pairs.T
+        imposed = (U0.reshape(-1, d)[slave] - U0.reshape(-1, d)[master]) * self.contact.normals
+        gap = (self.contact.gap - imposed.sum(axis=1)) / self._shortening
 
         def expand(w: FloatArray) -> FloatArray:
             flat = np.ravel(w)
             x = x0 - self.factor.solve(self._Kvw @ flat)
-            return np.asarray(self._Bv @ x + self._Bw @ flat + U0)
+            return np.asarray(fields.Bv @ x + fields.Bw @ flat + U0)
 
-        return Interface(self.S, np.asarray(f), gap, self.frames, self.active, self.rigid, self.kref, expand)
+        return Interface(self.S, f, gap, self.frames, self.active, self.rigid, self.kref, expand)
 
 
-def condense(
-    K: sp.csr_array, contact: ContactPairs, *, fixed: IntArray | None = None, method: str = "auto"
-) -> Condensation:
+def condense(K: sp.csr_array, contact: ContactPairs, reduction: Reduction, *, method: str = "auto") -> Condensation:
     """Factorise the tied bodies and compute the Schur complement on the contact pairs.
 
     Parameters
@@ -100,8 +99,8 @@ def condense(
         Stiffness of all bodies, not constrained; component c of node i is unknown ``d i + c``.
     contact : ContactPairs
         Pairs of all zones.
-    fixed : (n_fixed,) int64, optional
-        Unknowns whose displacement is prescribed.
+    reduction : Reduction
+        Conditions other than contact, from ``reduce_conditions`` with one column of prescribed values.
     method : str
         Package, see ``factorize``.
 
@@ -112,9 +111,11 @@ def condense(
     Raises
     ------
     SingularSystem
-        When the tied bodies are not held.
+        When the tied bodies are not held; ``nodes`` says which part moves.
     BadValue
         When pairs close a loop, so that their relative displacements are not independent.
+    ContradictoryConditions
+        When a linear relation holds a relative displacement alone, other than component by component.
 
     Notes
     -----
@@ -125,20 +126,63 @@ def condense(
     ----
     One factorisation, one back substitution per active component of w, (n d)^2 numbers of memory.
     """
-    fixed = np.zeros(0, dtype=np.int64) if fixed is None else np.asarray(fixed, dtype=np.int64)
     d = contact.normals.shape[1]
-    Bv, Bw, B0, free = _tie(K.shape[0], d, contact.pairs, fixed)
+    n_dofs = K.shape[0]
+    Bv, Bw, B0, free = tie(n_dofs, d, contact.pairs, reduction.fixed)
     frames, active, shortening = local_frames(contact.normals, free)
-    Bw = (Bw @ _to_global(frames, active)).tocsr()
-    KBw = K @ Bw
-    Kvw = (Bv.T @ KBw).tocsr()
-    factor = factorize(Bv.T @ K @ Bv, method=method)
-    S = _schur(factor, Kvw, (Bw.T @ KBw).toarray(), np.flatnonzero(active.ravel()))
+    fields = _Fields.of(Bv, sp.csr_array(Bw @ _to_global(frames, active)), B0, reduction)
+    KBw = K @ fields.Bw
+    Kvw = sp.csr_array(fields.Bv.T @ KBw)
+    try:
+        factor = factorize(fields.Bv.T @ K @ fields.Bv, method=method)
+    except SingularSystem as error:
+        moving = np.unique(fields.Bv[:, error.unknowns].nonzero()[0])
+        raise SingularSystem(f"tied bodies: {error.message}", np.unique(moving // d), moving) from error
+    S = _schur(factor, Kvw, (fields.Bw.T @ KBw).toarray(), np.flatnonzero(active.ravel()))
     kref = float(np.diag(S)[active.ravel()].mean()) if active.any() else 1.0
     inactive = np.flatnonzero(~active.ravel())
     S[inactive, inactive] = kref
     rigid = _free_motions(S, contact, frames, active, kref)
-    return Condensation(contact, factor, S, kref, frames, active, rigid, shortening, K, Bv, Bw, B0, Kvw, fixed)
+    return Condensation(contact, factor, S, kref, frames, active, rigid, shortening, K, Kvw, fields, reduction)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fields:
+    """Every admissible displacement, ``U = Bv x + Bw w + constant``, w in local components."""
+
+    Bv: sp.csr_array
+    Bw: sp.csr_array
+    B0: sp.csr_array
+    fixed: IntArray
+    tied: IntArray
+    relations: sp.csr_array
+    tie_matrix: sp.csr_array
+
+    @staticmethod
+    def of(Bv: sp.csr_array, Bw: sp.csr_array, B0: sp.csr_array, reduction: Reduction) -> _Fields:
+        """Add the linear relations, ``u[tied] = relation u[free] + offset[tied]``, as conditions on v given w."""
+        n_dofs, tied = reduction.n, reduction.tied
+        select = sp.eye_array(n_dofs, format="csr")
+        relations = sp.csr_array(select[tied] - reduction.relation @ select[reduction.free])
+        if not len(tied):
+            return _Fields(Bv, Bw, B0, reduction.fixed, tied, relations, Bv)
+        right = sp.csc_array(-(relations @ Bw))
+        touched = np.flatnonzero(np.diff(right.indptr))
+        second = reduce_conditions(relations @ Bv, right[:, touched].toarray())
+        chosen = sp.eye_array(Bv.shape[1], format="csr")
+        T = chosen[:, second.free] + chosen[:, second.tied] @ second.relation
+        follow = sp.csr_array(second.offset) @ sp.eye_array(Bw.shape[1], format="csr")[touched]
+        return _Fields(
+            sp.csr_array(Bv @ T), sp.csr_array(Bw + Bv @ follow), B0, reduction.fixed, tied, relations, Bv
+        )  # fmt: skip
+
+    def constant(self, offset: FloatArray) -> FloatArray:
+        """Compute the displacement at x = 0 and w = 0."""
+        U0 = np.asarray(self.B0 @ offset[self.fixed])
+        if len(self.tied):
+            rest = offset[self.tied] - self.relations @ U0
+            U0 = U0 + self.tie_matrix @ reduce_conditions(self.relations @ self.tie_matrix, rest).offset
+        return U0
 
 
 def _schur(factor: Factor, Kvw: sp.csr_array, S: FloatArray, columns: IntArray) -> FloatArray:
@@ -151,69 +195,6 @@ def _schur(factor: Factor, Kvw: sp.csr_array, S: FloatArray, columns: IntArray) 
         X = factor.solve(right[:, block].toarray())
         S[:, block] -= touched @ X[rows]
     return (S + S.T) / 2
-
-
-def _tie(
-    n_dofs: int, d: int, pairs: IntArray, fixed: IntArray
-) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array, BoolArray]:
-    """Write every displacement as ``U = Bv v + Bw w + B0 values``, w in global components.
-
-    Each unknown starts from a prescribed one, or from a master's, and the others of its group follow through their
-    pairs; a node may so be slave in one zone and master in another.
-    """
-    component = np.arange(d)
-    slave, master = (d * pairs[:, :1] + component).ravel(), (d * pairs[:, 1:] + component).ravel()
-    known = np.zeros(n_dofs, dtype=bool)
-    known[fixed] = True
-    free = ~(known[slave] & known[master])
-    group, has_fixed = _groups(n_dofs, slave[free], master[free], fixed)
-    _refuse_loops(group, slave[free], has_fixed, fixed, d)
-    roots = np.full(len(has_fixed), n_dofs)
-    np.minimum.at(roots, group, np.arange(n_dofs))
-    in_pair = np.full(len(has_fixed), n_dofs)
-    np.minimum.at(in_pair, group[master[free]], master[free])
-    roots = np.where(in_pair < n_dofs, in_pair, roots)[~has_fixed]
-    known[roots] = True
-    v = sp.csr_array((np.ones(len(roots)), (roots, np.arange(len(roots)))), (n_dofs, len(roots)))
-    q = sp.csr_array((np.ones(len(fixed)), (fixed, np.arange(len(fixed)))), (n_dofs, len(fixed)))
-    B = sp.hstack([v, sp.csr_array((n_dofs, len(slave))), q], format="csr")
-    waiting = np.flatnonzero(free)
-    while len(waiting):
-        forward = ~known[slave[waiting]] & known[master[waiting]]
-        backward = known[slave[waiting]] & ~known[master[waiting]]
-        now = waiting[forward | backward]
-        sign = np.where(forward, 1.0, -1.0)[forward | backward]
-        target = np.where(sign > 0, slave[now], master[now])
-        source = np.where(sign > 0, master[now], slave[now])
-        place = sp.csr_array((np.ones(len(now)), (target, np.arange(len(now)))), (n_dofs, len(now)))
-        step = sp.csr_array((sign, (np.arange(len(now)), len(roots) + now)), (len(now), B.shape[1]))
-        B = B + place @ (B[source] + step)
-        known[target] = True
-        waiting = waiting[~(forward | backward)]
-    split = len(roots), len(roots) + len(slave)
-    return B[:, : split[0]], B[:, split[0] : split[1]], B[:, split[1] :], free.reshape(-1, d)
-
-
-def _groups(n_dofs: int, slave: IntArray, master: IntArray, fixed: IntArray) -> tuple[IntArray, BoolArray]:
-    """Give the group of unknowns that pairs connect, for each unknown, and whether a group has a prescribed one."""
-    from scipy.sparse.csgraph import connected_components
-
-    links = sp.csr_array((np.ones(len(slave)), (slave, master)), (n_dofs, n_dofs))
-    n_groups, group = connected_components(links, directed=False)
-    has_fixed = np.zeros(n_groups, dtype=bool)
-    has_fixed[group[fixed]] = True
-    return group.astype(np.int64), has_fixed
-
-
-def _refuse_loops(group: IntArray, slave: IntArray, has_fixed: BoolArray, fixed: IntArray, d: int) -> None:
-    """Check that a group of m unknowns, k of them prescribed, has no more than m - max(k, 1) links."""
-    members = np.bincount(group, minlength=len(has_fixed))
-    prescribed = np.bincount(group[fixed], minlength=len(has_fixed))
-    links = np.bincount(group[slave], minlength=len(has_fixed))
-    bad = np.flatnonzero(links > members - np.maximum(prescribed, 1))
-    if len(bad):
-        nodes = np.unique(np.flatnonzero(np.isin(group, bad)) // d)
-        raise BadValue("contact nodes", nodes.tolist(), "pairs whose relative displacements are independent")
 
 
 def _to_global(frames: FloatArray, active: BoolArray) -> sp.csr_array:

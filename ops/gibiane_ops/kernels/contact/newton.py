@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.contact.balance import explain_failure
+from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
 from gibiane_ops.kernels.contact.cone import friction_bound, norms
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state, coefficients
+from gibiane_ops.kernels.errors import NotConverged
 
 REGULARISATION = 1e-8
 """Stiffness, relative to kref, given to free rigid motions in the Newton matrix only: the residual stays exact."""
@@ -81,15 +82,13 @@ def solve_coulomb(
     first = _first_guess(law, interface, start)
     best = _iterate(law, first, tolerance, max_iter, history, damped=False)
     if not best.converged:
+        raise_if_unbalanced(interface, _state(law, interface, best, history, slip_origin))
         best = _better(best, _iterate(law, first, tolerance, max_iter, history, damped=True))
     if not best.converged and law.mu.any():
         best = _better(best, _grow_friction(law, first, tolerance, max_iter, history))
-    w, r = law.physical(best.w, best.r, interface)
-    if not law.mu.any():
-        w = _without_drift(w, best.status, interface)
-    state = check_state(interface, w, r, best.status, coefficients(interface, mu), history, slip_origin)
+    state = _state(law, interface, best, history, slip_origin)
     if not best.converged:
-        explain_failure(interface, state)
+        raise NotConverged(history, state)
     return state
 
 
@@ -136,9 +135,6 @@ class _Law:
             S, S_newton, interface.f / force, interface.gap / length, coefficients(interface, mu), gamma, origin,
             interface.active[:, 0], force,
         )  # fmt: skip
-
-    def physical(self, w: FloatArray, r: FloatArray, interface: Interface) -> tuple[FloatArray, FloatArray]:
-        return w * self.force / interface.kref, r * self.force
 
     def augmented(self, w: FloatArray, r: FloatArray) -> FloatArray:
         """Compute ``a = r - gamma (w - origin)``, gap and earlier slip being the origin."""
@@ -274,6 +270,16 @@ def _grow_friction(
         found = last.w, last.r
     assert last is not None
     return last
+
+
+def _state(
+    law: _Law, interface: Interface, found: _Iterate, history: list[float], slip_origin: FloatArray | None
+) -> ContactState:
+    """Go back to physical units and measure the result."""
+    w = found.w * law.force / interface.kref
+    if not law.mu.any():
+        w = _without_drift(w, found.status, interface)
+    return check_state(interface, w, found.r * law.force, found.status, law.mu, history, slip_origin)
 
 
 def _merit(E1: FloatArray, E2: FloatArray) -> float:

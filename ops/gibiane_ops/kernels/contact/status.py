@@ -1,0 +1,163 @@
+"""The fixed point on statuses: friction forces imposed, normal contact solved, forces cut again.
+
+This method reproduces published tables. It is not exact Coulomb friction: a pair below its bound keeps the tangential
+force of the tied bodies and is not held, so that it may slide inside the cone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.contact.cone import norms, radial_projection
+from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state, coefficients
+from gibiane_ops.kernels.errors import NotConverged, StatusCycle
+
+BoolArray = NDArray[np.bool_]
+
+
+def solve_statuses(
+    interface: Interface,
+    mu: float | FloatArray,
+    *,
+    tolerance: float = 1e-4,
+    closing_distance: float | None = None,
+    max_iter: int = 100,
+) -> ContactState:
+    """Solve contact with friction by the fixed point on statuses.
+
+    Parameters
+    ----------
+    interface : Interface
+    mu : float or (n,) float64
+        Friction coefficients, not negative.
+    tolerance : float
+        Largest relative change of the largest tangential force.
+    closing_distance : float, optional
+        Penetration from which an open pair closes, a length; 5 % of ``interface.length_scale`` when left out.
+    max_iter : int
+        Solutions of the normal contact problem.
+
+    Returns
+    -------
+    ContactState
+        ``history`` holds the relative change of the largest tangential force after each solution. ``report`` measures
+        the distance to exact Coulomb friction, which is not small.
+
+    Raises
+    ------
+    StatusCycle
+        When the same statuses come back without convergence.
+    NotConverged
+        After ``max_iter`` solutions; ``best`` holds the last state.
+    BadValue
+        When a coefficient is negative.
+
+    Notes
+    -----
+    Starts from the reaction r0 of tied bodies. Repeat: G = tangential part of r0 cut radially at ``mu abs(r_n)`` with
+    the current r_n (always from r0); solve with G imposed and ``w_n = gap`` on closed pairs; a closed pair whose r_n is
+    a tension opens, an open one whose penetration exceeds ``closing_distance`` closes. Bodies being held along the
+    normals only, the tangential rigid motions take their smallest norm. The reaction of the result is (r_n, G).
+
+    Source
+    ------
+    Becheur, Tahakourt and Coorevits 2008, Mechanics Research Communications 35; the update of sliding forces is read
+    from its results.
+
+    Cost
+    ----
+    One dense factorisation per set of closed pairs, one back substitution per iteration.
+    """
+    mu = coefficients(interface, mu)
+    n, d = interface.n_pairs, interface.dim
+    closing = 0.05 * interface.length_scale if closing_distance is None else closing_distance
+    tied = np.where(interface.active, -interface.f.reshape(n, d), 0.0)
+    closed = interface.active[:, 0] & (tied[:, 0] <= 0)
+    G = _cut(tied, tied[:, 0], mu, closed)
+    normal = _NormalContact(interface, closed)
+    history: list[float] = []
+    seen: list[IntArray] = []
+    for _ in range(max_iter):
+        w, r = normal.solve(G)
+        opens = closed & (r[:, 0] > 0)
+        closes = interface.active[:, 0] & ~closed & (w[:, 0] > interface.gap + closing)
+        new_closed = (closed & ~opens) | closes
+        new_G = _cut(tied, r[:, 0], mu, new_closed)
+        largest = float(norms(new_G).max(initial=0))
+        change = abs(largest - float(norms(G).max(initial=0)))
+        history.append(change / largest if largest else change)
+        state = check_state(interface, w, r, _statuses(closed, tied, G), mu, history, None)
+        if not (opens | closes).any():
+            if change <= tolerance * largest:
+                return state
+        else:
+            _raise_if_cycling(seen, new_closed, history, state)
+            normal = _NormalContact(interface, new_closed)
+        closed, G = new_closed, new_G
+    raise NotConverged(history, state)
+
+
+class _NormalContact:
+    """Normal contact on given closed pairs, with given tangential forces."""
+
+    def __init__(self, interface: Interface, closed: BoolArray) -> None:
+        from scipy.linalg import cho_factor
+
+        self.interface = interface
+        self.known = np.zeros((interface.n_pairs, interface.dim), dtype=bool)
+        self.known[:, 0] = closed
+        free = ~self.known.ravel()
+        self.drift = self._drifts(free)
+        A = interface.S[np.ix_(free, free)] + interface.kref * self.drift @ self.drift.T
+        self.factor = cho_factor(A)
+
+    def solve(self, G: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Give w, of least drift, and the reaction (r_n, G)."""
+        from scipy.linalg import cho_solve
+
+        S, f = self.interface.S, self.interface.f
+        free = ~self.known.ravel()
+        w = np.where(self.known[:, 0], self.interface.gap, 0.0)[:, None] * np.eye(self.interface.dim)[0]
+        r = np.column_stack([np.zeros(len(w)), G])
+        flat = w.ravel()
+        right = (f + r.ravel())[free] - S[np.ix_(free, ~free)] @ flat[~free]
+        # what the drifts cannot balance has no answer: the smallest motion leaves it out
+        right -= self.drift @ (self.drift.T @ right)
+        flat[free] = cho_solve(self.factor, right)
+        w = flat.reshape(w.shape)
+        r[:, 0] = np.where(self.known[:, 0], (S @ flat - f).reshape(w.shape)[:, 0], 0.0)
+        return w, r
+
+    def _drifts(self, free: BoolArray) -> FloatArray:
+        """Find the rigid motions that keep closed pairs closed, as an orthonormal basis over the free components."""
+        R = self.interface.rigid
+        if R.shape[1] == 0:
+            return R[free]
+        _, values, Vt = np.linalg.svd(R[~free], full_matrices=True)
+        still = np.r_[values, np.zeros(R.shape[1] - len(values))] <= 1e-9
+        return np.asarray(R[free] @ Vt[still].T)
+
+
+def _cut(tied: FloatArray, normal: FloatArray, mu: FloatArray, closed: BoolArray) -> FloatArray:
+    """Cut the tangential reaction of tied bodies at the current bound; nothing on open pairs."""
+    held = np.where(closed, normal, 0.0)
+    return radial_projection(np.column_stack([held, tied[:, 1:]]), mu)[:, 1:]
+
+
+def _statuses(closed: BoolArray, tied: FloatArray, G: FloatArray) -> IntArray:
+    cut = norms(G) < norms(tied[:, 1:])
+    return np.where(closed, np.where(cut, SLIP, STICK), OPEN)
+
+
+def _raise_if_cycling(seen: list[IntArray], closed: BoolArray, history: list[float], state: ContactState) -> None:
+    """Compare the closed pairs with all earlier ones; twice may be a detour, three times is a cycle."""
+    now = np.flatnonzero(closed)
+    before = [i for i, old in enumerate(seen) if np.array_equal(old, now)]
+    seen.append(now)
+    if len(before) >= 2:
+        union = np.unique(np.concatenate(seen[before[-1] :]))
+        common = [i for i in union if all(i in old for old in seen[before[-1] :])]
+        raise StatusCycle(len(seen) - 1 - before[-1], np.setdiff1d(union, common), history, state)
