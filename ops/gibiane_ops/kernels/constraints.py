@@ -188,7 +188,7 @@ def reduce_conditions(C: sp.sparray, d: FloatArray | None = None, *, rtol: float
 
     Source
     ------
-    Golub and Van Loan, Matrix Computations, 5.5.6 (QR with column pivoting).
+    Golub and Van Loan, Matrix Computations, chapter 5 (QR with column pivoting).
 
     Cost
     ----
@@ -198,7 +198,7 @@ def reduce_conditions(C: sp.sparray, d: FloatArray | None = None, *, rtol: float
     C.sum_duplicates()
     m, n = C.shape
     values = np.zeros(m) if d is None else np.asarray(d, np.float64)
-    work = Elimination(C, values.reshape(m, -1), rtol)
+    work = Elimination(C, values if values.ndim == 2 else values[:, None], rtol)
     work.fix_single_unknowns()
     fixed = np.flatnonzero(work.fixed_by >= 0)
     work.solve_private_unknowns()
