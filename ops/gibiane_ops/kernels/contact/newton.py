@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,12 @@ from gibiane_ops.kernels.errors import NotConverged
 
 REGULARISATION = 1e-8
 """Stiffness, relative to kref, given to free rigid motions in the Newton matrix only: the residual stays exact."""
+
+SOFT_GAMMA = 1e-3
+"""Second value of gamma: pairs whose slip is small and turns back and forth settle with it."""
+
+_STALL = 8
+"""Full steps without a better residual after which another attempt is made."""
 
 _MEMORY = 4
 """A damped step must improve on the worst of the last few residuals, not on the last one."""
@@ -66,7 +72,8 @@ def solve_coulomb(
     -----
     With ``a = r - gamma (w - gap n)``: open when ``a_n >= 0`` (r = 0), stick when ``abs(a_t) <= mu abs(a_n)`` (w_t = 0)
     and slip otherwise (``r_t = mu abs(r_n) a_t / abs(a_t)``). Coulomb solutions are unique for small coefficients only:
-    for large ones this is one solution. When full steps fail, damped steps are tried, then growing coefficients.
+    for large ones this is one solution. When full steps fail, the load is first checked
+    against the cone on the free motions; then come a softer gamma, damped steps, and growing coefficients.
 
     Source
     ------
@@ -83,9 +90,12 @@ def solve_coulomb(
     best = _iterate(law, first, tolerance, max_iter, history, damped=False)
     if not best.converged:
         raise_if_unbalanced(interface, _state(law, interface, best, history, slip_origin))
-        best = _better(best, _iterate(law, first, tolerance, max_iter, history, damped=True))
+    soft = replace(law, gamma=min(gamma, SOFT_GAMMA))
+    for attempt, damped in ((soft, False), (law, True), (soft, True)):
+        if not best.converged:
+            best = _better(best, _iterate(attempt, first, tolerance, max_iter, history, damped=damped))
     if not best.converged and law.mu.any():
-        best = _better(best, _grow_friction(law, first, tolerance, max_iter, history))
+        best = _better(best, _grow_friction(soft, first, tolerance, max_iter, history))
     state = _state(law, interface, best, history, slip_origin)
     if not best.converged:
         raise NotConverged(history, state)
@@ -228,7 +238,7 @@ def _iterate(
     E1, E2 = law.residuals(w, r)
     recent = [_merit(E1, E2)]
     best = _record(law, w, r, E1, E2, tolerance)
-    seen: dict[bytes, float] = {}
+    stalled = 0
     for _ in range(max_iter):
         if best.converged:
             break
@@ -247,11 +257,9 @@ def _iterate(
         now = _record(law, w, r, E1, E2, tolerance)
         history.append(now.residual)
         best = _better(best, now)
-        # full steps depend on the statuses and little else: the same ones with the same residual are a cycle
-        key = now.status.tobytes()
-        if not damped and abs(seen.get(key, np.inf) - now.residual) <= 1e-6 * now.residual and not now.converged:
+        stalled = 0 if best is now else stalled + 1
+        if not damped and stalled >= _STALL:
             break
-        seen[key] = now.residual
     return best
 
 
@@ -262,10 +270,7 @@ def _grow_friction(
     found = first
     last: _Iterate | None = None
     for part in (0.1, 0.25, 0.5, 0.75, 0.9, 1.0):
-        milder = _Law(
-            law.S, law.S_newton, law.f, law.gap, part * np.minimum(law.mu, 1e8), law.gamma, law.origin, law.holds,
-            law.force,
-        )  # fmt: skip
+        milder = replace(law, mu=part * law.mu)
         last = _iterate(milder, found, tolerance, max_iter, history, damped=True)
         found = last.w, last.r
     assert last is not None
@@ -293,7 +298,7 @@ def _record(law: _Law, w: FloatArray, r: FloatArray, E1: FloatArray, E2: FloatAr
 
 
 def _better(a: _Iterate, b: _Iterate) -> _Iterate:
-    return b if b.converged or not b.residual > a.residual else a
+    return b if b.residual < a.residual else a
 
 
 def _without_drift(w: FloatArray, status: IntArray, interface: Interface) -> FloatArray:
