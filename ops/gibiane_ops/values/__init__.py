@@ -1,0 +1,1 @@
+"""The finite-element objects of the language: meshes, fields, models, matrices."""

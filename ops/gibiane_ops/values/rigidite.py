@@ -1,0 +1,111 @@
+"""RIGIDITE: stiffness matrices, conditions on unknowns, and contact conditions, kept as separate parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from gibiane.values import RIGIDITE, Value
+
+from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.values.modele import ContactZone
+from gibiane_ops.values.nodes import FloatArray, IntArray
+
+
+class MatrixPart:
+    """A symmetric matrix on the unknowns `names` of `nodes` (sorted): row `d i + c` is name c of node i."""
+
+    def __init__(self, nodes: IntArray, names: Sequence[str], duals: Sequence[str], matrix: sp.csr_array) -> None:
+        self.nodes = nodes
+        self.names = tuple(names)
+        self.duals = tuple(duals)
+        self.matrix = matrix
+
+
+class ConditionPart:
+    """Linear conditions, one row each: sum of `coefficients` times unknowns `=`, `<` or `>` a value.
+
+    Attributes
+    ----------
+    row, node : (k,) int64
+        Row and node of each term.
+    name : (k,) array of str
+        Unknown of each term.
+    coefficients : (k,) float64
+    multipliers : (n_rows,) int64
+        One node of the session per row: carries the value imposed (FLX) and the multiplier found (LX).
+    sense : str
+        "=", "<" (at most) or ">" (at least).
+    label : str
+        What the user wrote, for messages (BLOQ UX).
+    """
+
+    def __init__(self, row: IntArray, node: IntArray, name: Any, coefficients: FloatArray, multipliers: IntArray,
+                 sense: str, label: str) -> None:
+        self.row = row
+        self.node = node
+        self.name = np.asarray(name)
+        self.coefficients = coefficients
+        self.multipliers = multipliers
+        self.sense = sense
+        self.label = label
+
+
+class ContactPart:
+    """Contact conditions of one zone: node pairs, friction, and one multiplier node per pair.
+
+    Attributes
+    ----------
+    zone : ContactZone
+    pairs : ContactPairs
+        With nodes of the session; the gap used is the one of the second member (FLX on `multipliers`).
+    mu : (n_pairs,) float64
+        Friction coefficients, 0 without friction.
+    multipliers : (n_pairs,) int64
+    """
+
+    def __init__(self, zone: ContactZone, pairs: ContactPairs, mu: FloatArray, multipliers: IntArray) -> None:
+        self.zone = zone
+        self.pairs = pairs
+        self.mu = mu
+        self.multipliers = multipliers
+
+
+Part = MatrixPart | ConditionPart | ContactPart
+
+
+class Rigidite(Value):
+    """A list of parts; ET joins the lists. Nodes are those of the session."""
+
+    type_name = RIGIDITE
+
+    def __init__(self, parts: Sequence[Part]) -> None:
+        self.parts = list(parts)
+
+    @property
+    def matrices(self) -> list[MatrixPart]:
+        """The stiffness matrices."""
+        return [p for p in self.parts if isinstance(p, MatrixPart)]
+
+    @property
+    def conditions(self) -> list[ConditionPart]:
+        """The conditions on unknowns."""
+        return [p for p in self.parts if isinstance(p, ConditionPart)]
+
+    @property
+    def contacts(self) -> list[ContactPart]:
+        """The contact conditions."""
+        return [p for p in self.parts if isinstance(p, ContactPart)]
+
+    def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
+        """Yield the lines that LIST prints."""
+        yield f" RIGIDITE de pointeur {session.ordinal(self)}"
+        for part in self.parts:
+            if isinstance(part, MatrixPart):
+                yield f" matrice : {len(part.nodes)} noeud(s), inconnues {' '.join(part.names)}"
+            elif isinstance(part, ConditionPart):
+                yield f" conditions {part.label} : {len(part.multipliers)} relation(s) {part.sense}"
+            else:
+                yield f" contact : {len(part.multipliers)} paire(s) de noeuds"
