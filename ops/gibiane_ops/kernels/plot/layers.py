@@ -238,8 +238,9 @@ def sharp_sides(points: FloatArray, facets: Sequence[IntArray], angle: float = 3
     if not len(sides):
         return np.zeros(0, np.bool_)
     normal = facet_normals(in_space(points), facets)
-    _, group, count = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True)
-    group = group.ravel()
+    # one number for each pair of nodes: far faster to sort than rows
+    pair = sides.min(axis=1) * (int(sides.max()) + 1) + sides.max(axis=1)
+    _, group, count = np.unique(pair, return_inverse=True, return_counts=True)
     order = np.argsort(group, kind="stable")
     first = np.cumsum(count) - count
     mate = owner[order[first]]
