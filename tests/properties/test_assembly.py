@@ -1,0 +1,190 @@
+"""Properties of the assembled stiffness that hold on every shape: patch test, rigid modes, symmetry, objectivity."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gibiane_ops.kernels import assembly, geometry, topology
+from gibiane_ops.kernels.arrays import strain_vector
+from gibiane_ops.kernels.constraints import reduce_conditions
+from gibiane_ops.kernels.elements.table import SHAPES
+from gibiane_ops.kernels.materials import isotropic
+from gibiane_ops.kernels.rigid import rigid_modes
+
+NAMES = ["TRI3", "QUA4", "TET4", "PYR5", "PRI6", "CUB8"]
+E, NU = 210000.0, 0.3
+# Cutting of a CUB8: six tetrahedra around the diagonal 0-6, two prisms; pyramids take the centre (8) as apex.
+CUTS = {
+    "QUA4": [[0, 1, 2, 3]],
+    "TRI3": [[0, 1, 2], [0, 2, 3]],
+    "CUB8": [[0, 1, 2, 3, 4, 5, 6, 7]],
+    "PRI6": [[0, 1, 2, 4, 5, 6], [0, 2, 3, 4, 6, 7]],
+    "TET4": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
+    "PYR5": [[*reversed(nodes), 8] for _, nodes in SHAPES["CUB8"].faces],
+}
+
+
+def box(name: str, counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Mesh [0, counts] with one shape, unit cells."""
+    dim = len(counts)
+    size = [n + 1 for n in counts]
+    points = np.stack(np.meshgrid(*[np.arange(n, dtype=float) for n in size], indexing="ij"), -1).reshape(-1, dim)
+    number = np.arange(np.prod(size)).reshape(size)
+    corners = SHAPES["QUA4" if dim == 2 else "CUB8"].ref_nodes > 0
+    cells = np.stack(
+        [number[tuple(slice(int(c), int(c) + n) for c, n in zip(corner, counts, strict=True))] for corner in corners],
+        -1,
+    ).reshape(-1, 2**dim)
+    if name == "PYR5":
+        cells = np.c_[cells, len(points) + np.arange(len(cells))]
+        points = np.vstack([points, points[cells[:, :8]].mean(axis=1)])
+    return points, cells[:, CUTS[name]].reshape(-1, SHAPES[name].n_nodes)
+
+
+def mesh(name: str, seed: int = 0, distortion: float = 0.15, counts: tuple[int, ...] | None = None):
+    dim = SHAPES[name].dim
+    points, cells = box(name, counts or (3, 2, 2)[:dim])
+    points = points + distortion * np.random.default_rng(seed).uniform(-1, 1, points.shape)
+    return points, cells
+
+
+def law(name: str) -> np.ndarray:
+    return isotropic(E, NU, "TRID" if SHAPES[name].dim == 3 else "DEFO")
+
+
+def stiffness(name: str, points: np.ndarray, cells: np.ndarray, D: np.ndarray | None = None) -> sp.csr_array:
+    Ke = assembly.element_stiffness(SHAPES[name], points[cells], law(name) if D is None else D)
+    return assembly.assemble(len(points), points.shape[1], [(cells, Ke)])
+
+
+def fixed(unknowns: np.ndarray, n: int) -> sp.csr_array:
+    return sp.csr_array((np.ones(len(unknowns)), (np.arange(len(unknowns)), unknowns)), shape=(len(unknowns), n))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=8, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000))
+def test_patch(name: str, seed: int) -> None:
+    """A linear field prescribed on the boundary of a distorted mesh is found inside, with constant stress."""
+    points, cells = mesh(name, seed)
+    dim = points.shape[1]
+    A = np.random.default_rng(seed + 1).standard_normal((dim, dim))
+    exact = points @ A.T
+    skin = np.unique(np.concatenate([f.nodes.ravel() for f in topology.boundary([(name, cells)]).values()]))
+    unknowns = (skin[:, None] * dim + np.arange(dim)).ravel()
+    K = stiffness(name, points, cells)
+    reduction = reduce_conditions(fixed(unknowns, points.size), exact[skin].ravel())
+    load = reduction.load(K, np.zeros(points.size))
+    u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), load)).reshape(-1, dim)
+    assert len(skin) < len(points)
+    assert np.allclose(u, exact, atol=1e-12 * np.abs(exact).max())
+    each = SHAPES[name]
+    stress = assembly.stresses(assembly.strains(each, points[cells], u[cells], each.gauss[0]), law(name))
+    H = np.zeros((3, 3))
+    H[:dim, :dim] = A
+    constant = law(name) @ strain_vector((H + H.T) / 2, stress.shape[-1])
+    assert np.abs(stress - constant).max() < 1e-12 * np.abs(constant).max() * 10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rigid_modes_and_nothing_else(name: str) -> None:
+    points, cells = mesh(name, 4, counts=(2, 1, 1)[: SHAPES[name].dim])
+    K = stiffness(name, points, cells).toarray()
+    values = np.linalg.eigvalsh(K)
+    n_rigid = 6 if points.shape[1] == 3 else 3
+    assert np.abs(values[:n_rigid]).max() < 1e-12 * values[-1]
+    assert values[n_rigid] > 1e-6 * values[-1]
+    assert np.abs(K @ rigid_modes(points)).max() < 1e-11 * values[-1]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_single_elements_have_no_spurious_mode(name: str) -> None:
+    each = SHAPES[name]
+    values = np.linalg.eigvalsh(assembly.element_stiffness(each, each.ref_nodes[None], law(name))[0])
+    assert np.count_nonzero(values < 1e-9 * values[-1]) == (6 if each.dim == 3 else 3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_symmetry(name: str) -> None:
+    K = stiffness(name, *mesh(name, 5))
+    assert np.abs((K - K.T).data).max() <= 1e-15 * np.abs(K.data).max() * 10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_numbering_changes_nothing(name: str) -> None:
+    points, cells = mesh(name, 6)
+    dim = points.shape[1]
+    rng = np.random.default_rng(8)
+    order = rng.permutation(len(points))
+    place = np.argsort(order)
+    K = stiffness(name, points, cells)
+    renumbered = stiffness(name, points[order], place[rng.permutation(cells)])
+    unknowns = (order[:, None] * dim + np.arange(dim)).ravel()
+    assert np.abs(renumbered - K[unknowns][:, unknowns]).max() < 1e-14 * np.abs(K.data).max() * 10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_turning_the_body_turns_the_stiffness(name: str) -> None:
+    points, cells = mesh(name, 7)
+    dim = points.shape[1]
+    Q, _ = np.linalg.qr(np.random.default_rng(9).standard_normal((dim, dim)))
+    Q *= np.sign(np.linalg.det(Q)) if dim == 3 else 1.0
+    if dim == 2 and np.linalg.det(Q) < 0:
+        Q = Q[::-1]
+    turn = sp.kron(sp.eye_array(len(points)), Q).tocsr()
+    K = stiffness(name, points, cells)
+    assert np.abs(stiffness(name, points @ Q.T, cells) - turn @ K @ turn.T).max() < 1e-13 * np.abs(K.data).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("mode", ["DEFO", "CONT"])
+def test_bar_under_traction(name: str, mode: str) -> None:
+    """A traction s on the end of a bar on rollers gives u = s L / E (E / (1 - nu^2) in plane strain), exactly."""
+    each = SHAPES[name]
+    dim, s = each.dim, 50.0
+    points, cells = box(name, (4, 1, 1)[:dim])
+    inner = np.all((points > 0) & (points < np.array([4, 1, 1][:dim])), axis=1)
+    points[inner] += 0.1
+    slide = (points[:, 0] > 0) & (points[:, 0] < 4)
+    points[slide, 0] += 0.1 * np.random.default_rng(3).uniform(-1, 1, slide.sum())
+    D = isotropic(E, NU) if dim == 3 else isotropic(E, NU, mode)
+    K = stiffness(name, points, cells, D)
+    supports = np.concatenate([np.flatnonzero(points[:, i] == 0) * dim + i for i in range(dim)])
+    load = np.zeros(points.size)
+    for face_name, facets in topology.boundary([(name, cells)]).items():
+        end = facets.nodes[np.all(points[facets.nodes][:, :, 0] == 4, axis=1)]
+        forces = assembly.pressure_load(SHAPES[face_name], points[end], -s)
+        load += assembly.assemble_vector(len(points), dim, [(end, forces)])
+    assert load.reshape(-1, dim).sum(axis=0)[0] == pytest.approx(s)
+    reduction = reduce_conditions(fixed(supports, points.size))
+    u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), reduction.load(K, load)))
+    stretch = s / E * (1 - NU**2 if dim == 2 and mode == "DEFO" else 1.0)
+    assert np.allclose(u.reshape(-1, dim)[:, 0], stretch * points[:, 0], atol=1e-12 * 4 * stretch * 10)
+    stress = assembly.stresses(assembly.strains(each, points[cells], u.reshape(-1, dim)[cells], each.gauss[0]), D)
+    assert np.allclose(stress[..., 0], s, rtol=1e-11)
+    r = reduction.reactions(K, u, load).reshape(-1, dim)
+    assert r.sum(axis=0) == pytest.approx([-s, 0, 0][:dim], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_closed_boundary_under_pressure_is_in_balance(name: str) -> None:
+    points, cells = mesh(name, 10)
+    total, moment = np.zeros(3), np.zeros(3)
+    for face_name, facets in topology.boundary([(name, cells)]).items():
+        X = points[facets.nodes]
+        forces = np.zeros((*X.shape[:2], 3))
+        forces[..., : points.shape[1]] = assembly.pressure_load(SHAPES[face_name], X, 7.0)
+        arms = np.zeros_like(forces)
+        arms[..., : points.shape[1]] = X
+        total += forces.sum(axis=(0, 1))
+        moment += np.cross(arms, forces).sum(axis=(0, 1))
+    assert np.abs(total).max() < 1e-11
+    assert np.abs(moment).max() < 1e-11
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_volumes_fill_the_box(name: str) -> None:
+    points, cells = box(name, (3, 2, 2)[: SHAPES[name].dim])
+    assert geometry.measures(SHAPES[name], points[cells]).sum() == pytest.approx(12.0 if points.shape[1] == 3 else 6.0)
