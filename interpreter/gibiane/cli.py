@@ -1,7 +1,11 @@
-"""The command line: run, repl, check, info, docs. Exit codes 0 4 8 12; 2 wrong usage, 70 internal, 130 interrupted."""
+"""The command line: run, repl, check, info, test, docs.
+
+Exit codes: 0 4 8 12 by the highest error level; 2 wrong usage, 70 internal failure, 130 interrupted.
+"""
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +18,7 @@ usage: gibiane FILE [NAME=VALUE ...]    run a script (- reads it from standard i
        gibiane -i FILE [NAME=VALUE ...] run a script and stay at the prompt
        gibiane check FILE...            parse only: report syntax errors
        gibiane info NAME                describe an operator
+       gibiane test DIR [--bless]       run golden scripts: x.dgibi against x.out
        gibiane docs [--check] [FILE]    write OPERATORS.md, or say whether it is stale
 options: --echo N  --lang fr|en  --strict  --allow-exec  --debug  --version  --help
 """
@@ -126,23 +131,9 @@ def _session(options: dict[str, Any], assignments: Sequence[str], *, interactive
     session.options["EXEC"] = bool(options.get("allow-exec"))
     session.options["STRICT"] = bool(options.get("strict"))
     for text in assignments:
-        name, equal, value = text.partition("=")
-        if not equal or not name.isidentifier():
+        if not session.define(text):
             raise _Usage(f"'{text}' is not NAME=VALUE")
-        session.globals.names[name.upper()[:24]] = _value(value)
     return session
-
-
-def _value(text: str) -> Any:
-    """Return the object that NAME=VALUE defines: a number if the text is one, VRAI/FAUX, else a word."""
-    if text.upper() in ("VRAI", "FAUX"):
-        return text.upper() == "VRAI"
-    for kind in (int, float):
-        try:
-            return kind(text.upper().replace("D", "E") if kind is float else text)
-        except ValueError:
-            continue
-    return text
 
 
 def _finish(session: Any, code: int) -> int:
@@ -201,4 +192,14 @@ def _docs(options: dict[str, Any], files: list[str]) -> int:
     return 0
 
 
-_COMMANDS = {"check": _check, "info": _info, "docs": _docs}
+def _test(options: dict[str, Any], folders: list[str]) -> int:
+    if len(folders) != 1 or not Path(folders[0]).is_dir():
+        raise _Usage("test needs a folder of golden scripts")
+    if options.get("bless") and os.environ.get("CI"):
+        raise _Usage("--bless is refused when CI is set")
+    from gibiane import goldens
+
+    return goldens.main(Path(folders[0]), accept=bool(options.get("bless")), write=sys.stdout.write)
+
+
+_COMMANDS = {"check": _check, "info": _info, "test": _test, "docs": _docs}

@@ -45,7 +45,8 @@ class Library:
             found = sorted(root.rglob("*.procedur")) if root else []
             self._shipped = {p.stem.upper(): p for p in found}
         if word in self._shipped:
-            return _read(self._shipped[word])
+            path = self._shipped[word]
+            return SourceText(f"scripts/{path.name}", decode(path.read_bytes()), str(path.parent))
         self._absent.add(key)
         return None
 

@@ -119,6 +119,14 @@ class Session:
         """Call a procedure (an object or its name) from an operator; return its results."""
         return self.evaluator.call_values(procedure, arguments, span)
 
+    def define(self, assignment: str) -> bool:
+        """Define an object from `NAME=VALUE` (command line, golden header); False when the text is not that."""
+        name, equal, value = assignment.partition("=")
+        if not equal or not name.isidentifier():
+            return False
+        self.globals.names[name.upper()[:24]] = _value(value)
+        return True
+
     # -- running --------------------------------------------------------------------------------------------
 
     def run_text(self, text: str, name: str = "<text>", directory: str | None = None) -> int:
@@ -197,6 +205,18 @@ class Session:
         if not isinstance(value, Value):
             raise TypeError(type_of(value))
         return list(value.listing(self, brief, width))
+
+
+def _value(text: str) -> Any:
+    """Return the object that NAME=VALUE defines: a number if the text is one, VRAI/FAUX, else a word."""
+    if text.upper() in ("VRAI", "FAUX"):
+        return text.upper() == "VRAI"
+    for kind in (int, float):
+        try:
+            return kind(text.upper().replace("D", "E") if kind is float else text)
+        except ValueError:
+            continue
+    return text
 
 
 def load_operators(session: Session) -> None:
