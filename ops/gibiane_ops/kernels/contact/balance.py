@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection
+from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection, radial_projection
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.errors import ContactUnbalanced
+
+RUNAWAY = 1e5
+"""Free motion, over the natural length of the interface, that no static solution shows."""
 
 UNBALANCED = 1e-5
 """Part of the load that may stay unbalanced before the problem is said to have no solution."""
@@ -83,6 +86,34 @@ def raise_if_unbalanced(interface: Interface, state: ContactState) -> None:
     share, motion = unbalanced_load(interface, state.mu)
     if share > UNBALANCED:
         raise ContactUnbalanced(kind_of_motion(motion, state.mu), share, motion, state.history, state)
+
+
+def raise_if_runaway(interface: Interface, last: ContactState, best: ContactState) -> None:
+    """Raise the error that names the motion which starts, when the iterations ran away along a free motion.
+
+    Needed where supports fix the normal forces: the cone alone then allows any pressure, and proves nothing.
+
+    Parameters
+    ----------
+    interface : Interface
+    last : ContactState
+        Last state of the full Newton steps.
+    best : ContactState
+        Best state reached, kept in the error.
+
+    Raises
+    ------
+    ContactUnbalanced
+        When the free motion exceeds ``RUNAWAY`` times the natural length of the interface.
+    """
+    R = interface.rigid
+    motion = (R @ (R.T @ last.w.ravel())).reshape(last.w.shape)
+    size = float(np.abs(motion).max(initial=0))
+    if size > RUNAWAY * interface.length_scale > 0:
+        r = radial_projection(last.r, last.mu)
+        share = float(np.linalg.norm(R.T @ (interface.f + r.ravel())) / np.linalg.norm(R.T @ interface.f))
+        motion = motion / size
+        raise ContactUnbalanced(kind_of_motion(motion, last.mu), share, motion, best.history, best)
 
 
 def kind_of_motion(motion: FloatArray, mu: FloatArray) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
+from gibiane_ops.kernels.contact.balance import raise_if_runaway, raise_if_unbalanced
 from gibiane_ops.kernels.contact.cone import friction_bound, norms
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state, coefficients
@@ -49,7 +49,8 @@ def solve_coulomb(
     tolerance : float
         Largest residual, in force, over the largest condensed load.
     max_iter : int
-        Newton steps of one attempt.
+        Newton steps of one attempt; full steps may be as many as twice the pairs, since slip may spread from pair to
+        pair, and stop when they no longer make progress.
     start : ContactState, optional
         First guess, for instance at another coefficient; the tied bodies when left out.
     slip_origin : (n, d - 1) float64, optional
@@ -72,8 +73,8 @@ def solve_coulomb(
     -----
     With ``a = r - gamma (w - gap n)``: open when ``a_n >= 0`` (r = 0), stick when ``abs(a_t) <= mu abs(a_n)`` (w_t = 0)
     and slip otherwise (``r_t = mu abs(r_n) a_t / abs(a_t)``). Coulomb solutions are unique for small coefficients only:
-    for large ones this is one solution. When full steps fail, the load is first checked
-    against the cone on the free motions; then come a softer gamma, damped steps, and growing coefficients.
+    for large ones this is one solution. When full steps fail, the load is first checked against the cone on the free
+    motions; then come a softer gamma, damped steps, and growing coefficients.
 
     Source
     ------
@@ -87,17 +88,18 @@ def solve_coulomb(
     law = _Law.of(interface, mu, gamma, slip_origin)
     history: list[float] = []
     first = _first_guess(law, interface, start)
-    best = _iterate(law, first, tolerance, max_iter, history, damped=False)
+    best, last = _iterate(law, first, tolerance, max(max_iter, 2 * interface.n_pairs), history, damped=False)
     if not best.converged:
         raise_if_unbalanced(interface, _state(law, interface, best, history, slip_origin))
     soft = replace(law, gamma=min(gamma, SOFT_GAMMA))
     for attempt, damped in ((soft, False), (law, True), (soft, True)):
         if not best.converged:
-            best = _better(best, _iterate(attempt, first, tolerance, max_iter, history, damped=damped))
+            best = _better(best, _iterate(attempt, first, tolerance, max_iter, history, damped=damped)[0])
     if not best.converged and law.mu.any():
         best = _better(best, _grow_friction(soft, first, tolerance, max_iter, history))
     state = _state(law, interface, best, history, slip_origin)
     if not best.converged:
+        raise_if_runaway(interface, _state(law, interface, last, history, slip_origin), state)
         raise NotConverged(history, state)
     return state
 
@@ -232,12 +234,12 @@ def _iterate(
     history: list[float],
     *,
     damped: bool,
-) -> _Iterate:
-    """Run Newton steps from a first guess and give the best iterate met."""
+) -> tuple[_Iterate, _Iterate]:
+    """Run Newton steps from a first guess and give the best iterate met, and the last."""
     w, r = first
     E1, E2 = law.residuals(w, r)
     recent = [_merit(E1, E2)]
-    best = _record(law, w, r, E1, E2, tolerance)
+    best = now = _record(law, w, r, E1, E2, tolerance)
     stalled = 0
     for _ in range(max_iter):
         if best.converged:
@@ -260,7 +262,7 @@ def _iterate(
         stalled = 0 if best is now else stalled + 1
         if not damped and stalled >= _STALL:
             break
-    return best
+    return best, now
 
 
 def _grow_friction(
@@ -271,7 +273,7 @@ def _grow_friction(
     last: _Iterate | None = None
     for part in (0.1, 0.25, 0.5, 0.75, 0.9, 1.0):
         milder = replace(law, mu=part * law.mu)
-        last = _iterate(milder, found, tolerance, max_iter, history, damped=True)
+        last = _iterate(milder, found, tolerance, max_iter, history, damped=True)[0]
         found = last.w, last.r
     assert last is not None
     return last
