@@ -294,7 +294,8 @@ def _merit(E1: FloatArray, E2: FloatArray) -> float:
 
 
 def _record(law: _Law, w: FloatArray, r: FloatArray, E1: FloatArray, E2: FloatArray, tolerance: float) -> _Iterate:
-    residual = float(max(np.abs(E1).max(initial=0), np.abs(E2).max(initial=0)))
+    # with a small gamma E1 says little about w: count it as if gamma were at least kref
+    residual = float(max(np.abs(E1).max(initial=0) * max(1.0, 1 / law.gamma), np.abs(E2).max(initial=0)))
     status = law.project(law.augmented(w, r))[1]
     return _Iterate(w, r, status, residual, residual <= tolerance)
 

@@ -60,7 +60,9 @@ def solve_statuses(
     Starts from the reaction r0 of tied bodies. Repeat: G = tangential part of r0 cut radially at ``mu abs(r_n)`` with
     the current r_n (always from r0); solve with G imposed and ``w_n = gap`` on closed pairs; a closed pair whose r_n is
     a tension opens, an open one whose penetration exceeds ``closing_distance`` closes. Bodies being held along the
-    normals only, the tangential rigid motions take their smallest norm. The reaction of the result is (r_n, G).
+    normals only, the tangential rigid motions take their smallest norm. The reaction of the result is (r_n, G), G being
+    cut at the r_n of the iteration before. The criterion looks at the largest force only: where that one is not cut,
+    smaller ones may stay beyond their bound, see ``report.excess_friction``.
 
     Source
     ------
