@@ -9,7 +9,7 @@ import numpy as np
 from gibiane.fortran import scientific
 from gibiane.values import CHPOINT, MCHAML, Value
 
-from gibiane_ops.values.modele import ModelZone
+from gibiane_ops.values.modele import ContactZone, ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore
 
 INDETERMINE, DIFFUS, DISCRET = "INDETERMINE", "DIFFUS", "DISCRET"
@@ -79,8 +79,9 @@ class ChPoint(Value):
         return np.column_stack([self.at(name, nodes) for name in names]) if names else np.zeros((len(nodes), 0))
 
     @classmethod
-    def from_table(cls, store: NodeStore, names: Sequence[str], nodes: IntArray, values: FloatArray,
-                   nature: str = DIFFUS) -> ChPoint:
+    def from_table(
+        cls, store: NodeStore, names: Sequence[str], nodes: IntArray, values: FloatArray, nature: str = DIFFUS
+    ) -> ChPoint:
         """Make a field whose components live on the same nodes, values (k, n_names)."""
         return cls(store, {name: (nodes, values[:, i]) for i, name in enumerate(names)}, nature)
 
@@ -92,8 +93,10 @@ class ChPoint(Value):
             if brief:
                 continue
             for start in range(0, len(nodes), 5):
-                yield "".join(f"{n + 1:>8} {scientific(float(v))}" for n, v in
-                              zip(nodes[start : start + 5], values[start : start + 5], strict=True))
+                yield "".join(
+                    f"{n + 1:>8} {scientific(float(v))}"
+                    for n, v in zip(nodes[start : start + 5], values[start : start + 5], strict=True)
+                )
 
 
 def _sorted(nodes: IntArray, values: FloatArray) -> Part:
@@ -110,7 +113,7 @@ class ChamZone:
 
     __slots__ = ("names", "values", "zone")
 
-    def __init__(self, zone: ModelZone, names: Sequence[str], values: FloatArray) -> None:
+    def __init__(self, zone: ModelZone | ContactZone, names: Sequence[str], values: FloatArray) -> None:
         self.zone = zone
         self.names = tuple(names)
         self.values = values
@@ -138,7 +141,7 @@ class MChaml(Value):
         """Component names over all zones, in order of appearance."""
         return list(dict.fromkeys(name for zone in self.zones for name in zone.names))
 
-    def zone_of(self, zone: ModelZone) -> ChamZone | None:
+    def zone_of(self, zone: ModelZone | ContactZone) -> ChamZone | None:
         """Return the values on a zone of a model, or None."""
         return next((z for z in self.zones if z.zone is zone), None)
 
@@ -147,7 +150,8 @@ class MChaml(Value):
         yield f" MCHAML de pointeur {session.ordinal(self)} de sous-type {self.subtype} aux points {self.support}"
         for number, zone in enumerate(self.zones, 1):
             m, q, _ = zone.values.shape
-            yield f" zone {number} : {m} element(s) {zone.zone.shape}, {q} point(s), composantes {' '.join(zone.names)}"
+            where = zone.zone.shape if isinstance(zone.zone, ModelZone) else "de contact"
+            yield f" zone {number} : {m} element(s) {where}, {q} point(s), composantes {' '.join(zone.names)}"
             if brief:
                 continue
             for i in range(m):

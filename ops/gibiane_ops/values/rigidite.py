@@ -10,18 +10,30 @@ import scipy.sparse as sp
 from gibiane.values import RIGIDITE, Value
 
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.modele import ContactZone
 from gibiane_ops.values.nodes import FloatArray, IntArray
 
 
 class MatrixPart:
-    """A symmetric matrix on the unknowns `names` of `nodes` (sorted): row `d i + c` is name c of node i."""
+    """A symmetric matrix on the unknowns `names` of `nodes` (sorted): row `d i + c` is name c of node i.
 
-    def __init__(self, nodes: IntArray, names: Sequence[str], duals: Sequence[str], matrix: sp.csr_array) -> None:
+    `mesh` holds the elements that it came from: contact looks there on which side of a surface its solid lies.
+    """
+
+    def __init__(
+        self,
+        nodes: IntArray,
+        names: Sequence[str],
+        duals: Sequence[str],
+        matrix: sp.csr_array,
+        mesh: Maillage | None = None,
+    ) -> None:
         self.nodes = nodes
         self.names = tuple(names)
         self.duals = tuple(duals)
         self.matrix = matrix
+        self.mesh = mesh
 
 
 class ConditionPart:
@@ -42,8 +54,16 @@ class ConditionPart:
         What the user wrote, for messages (BLOQ UX).
     """
 
-    def __init__(self, row: IntArray, node: IntArray, name: Any, coefficients: FloatArray, multipliers: IntArray,
-                 sense: str, label: str) -> None:
+    def __init__(
+        self,
+        row: IntArray,
+        node: IntArray,
+        name: Any,
+        coefficients: FloatArray,
+        multipliers: IntArray,
+        sense: str,
+        label: str,
+    ) -> None:
         self.row = row
         self.node = node
         self.name = np.asarray(name)

@@ -1,0 +1,66 @@
+"""COFR: pressure, traction, gap, slip and status on contact surfaces."""
+
+from __future__ import annotations
+
+import numpy as np
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, operator
+from gibiane.values import CHPOINT, MCHAML, MMODEL
+
+from gibiane_ops.kernels.estimate.contact import densities
+from gibiane_ops.values.champs import DIFFUS, ChPoint, MChaml
+from gibiane_ops.values.contact import solved_contacts
+from gibiane_ops.values.modele import Modele
+from gibiane_ops.values.nodes import node_store
+
+COFR = operator(
+    "COFR",
+    topic="contact",
+    summary="pressure, friction traction, gap, slip and status on contact surfaces",
+    notice="On the nodes of the slave surface: PN normal pressure (positive in compression), PT1 PT2 friction "
+    "traction, GN gap, GT1 GT2 slip, ETAT status (0 open, 1 stick, 2 slip). REA holds the contact "
+    "forces, REAC RC U. Pressure and traction are nodal forces divided by the mass matrix of the "
+    "facets, or by its row sums with 'LUMP'.",
+    example="INFO REAC ;",
+    see=["RESO", "REAC", "ERREUR"],
+)
+
+
+@COFR.form(
+    Arg("mc", MMODEL, "contact model"),
+    Arg("u", CHPOINT, "solution"),
+    Arg("rea", CHPOINT, "contact forces"),
+    Arg("matc", MCHAML, "material of the contact", optional=True),
+    Key("LUMP", "lumped mass of the facets"),
+    gives=[CHPOINT],
+)
+def _cofr(ctx: Context, mc: Modele, u: ChPoint, rea: ChPoint, matc: MChaml | None, lump: bool) -> ChPoint:
+    store = node_store(ctx)
+    columns: dict[str, list[tuple[object, object]]] = {}
+    for zone in solved_contacts(ctx, mc, matc, u, rea):
+        nodes = zone.pairs.pairs[:, 0]
+        dim = zone.frames.shape[1]
+        in_space = np.einsum("nij,ni->nj", zone.frames, zone.force)
+        R = densities(store.coords[:, :dim], zone.zone.slave.kernel_blocks, nodes, in_space, lumped=lump)
+        local = np.einsum("nij,nj->ni", zone.frames, R)
+        scale = np.abs(zone.force).max(initial=0.0)
+        slip = np.linalg.norm(zone.relative[:, 1:], axis=1)
+        closed = -zone.force[:, 0] > 1e-9 * scale
+        moving = slip > 1e-9 * np.abs(zone.relative).max(initial=0.0)
+        status = np.where(closed, np.where(moving, 2.0, 1.0), 0.0)
+        values = {
+            "PN": -local[:, 0],
+            "PT1": local[:, 1],
+            "GN": zone.gap - zone.relative[:, 0],
+            "GT1": zone.relative[:, 1],
+            "ETAT": status,
+        }
+        if dim == 3:
+            values |= {"PT2": local[:, 2], "GT2": zone.relative[:, 2]}
+        for name, value in values.items():
+            columns.setdefault(name, []).append((nodes, value))
+    parts = {
+        name: (np.concatenate([n for n, _ in pieces]), np.concatenate([v for _, v in pieces]))  # type: ignore[misc]
+        for name, pieces in columns.items()
+    }
+    return ChPoint(store, parts, DIFFUS)

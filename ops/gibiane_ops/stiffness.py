@@ -1,0 +1,133 @@
+"""RIGI: stiffness of solids, and contact conditions of contact zones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gibiane.forms import Arg
+from gibiane.registry import Context, extend, operator
+from gibiane.values import MCHAML, MMODEL, RIGIDITE
+
+from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.values.champs import ChPoint, MChaml
+from gibiane_ops.values.failures import worded
+from gibiane_ops.values.maillage import Maillage
+from gibiane_ops.values.material import elastic_law
+from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, ContactZone, Modele
+from gibiane_ops.values.nodes import FloatArray, node_store
+from gibiane_ops.values.rigidite import ContactPart, MatrixPart, Rigidite
+
+RIGI = operator(
+    "RIGIDITE",
+    topic="resolution",
+    summary="stiffness of a model, or conditions of a contact zone",
+    notice="Solid: the stiffness matrix. Contact: `RC JC = RIGI MC MATC` gives the contact and friction "
+    "conditions and their second member (the initial gap), to be joined to the stiffness and to the "
+    "load: RESO (K ET RC) (F ET JC).",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
+    "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
+    "K = RIGI MO MA ; LIST 'RESU' K ;",
+    see=["MODELISER", "MATERIAU", "RESO"],
+)
+
+
+@RIGI.form(
+    Arg("model", MMODEL, "model"), Arg("material", MCHAML, "its material", optional=True), gives=[RIGIDITE, "(CHPOINT)"]
+)
+def _rigi(ctx: Context, model: Modele, material: MChaml | None) -> Any:
+    if model.contacts and model.zones:
+        ctx.fail(21, "the model mixes solids and contact: make their matrices one by one", at="model")
+    if model.contacts:
+        return _contact(ctx, model, material)
+    if material is None:
+        raise ctx.operands.missing(MCHAML, "the material")
+    return _solid(ctx, model, material)
+
+
+def _solid(ctx: Context, model: Modele, material: MChaml) -> Rigidite:
+    store = node_store(ctx)
+    zones = model.zones
+    family, dim = zones[0].family, zones[0].dim
+    mesh = Maillage(store, [b for zone in zones for b in zone.mesh.blocks])
+    nodes = mesh.nodes
+    blocks = []
+    for zone in zones:
+        D = elastic_law(ctx, material, zone, "material")
+        X = store.coords[zone.cells][..., :dim]
+        with worded(ctx, at="model"):
+            blocks.append((np.searchsorted(nodes, zone.cells), assembly.element_stiffness(shape(zone.shape), X, D)))
+    matrix = assembly.assemble(len(nodes), dim, blocks)
+    return Rigidite([MatrixPart(nodes, DISPLACEMENTS[family], FORCES[family], matrix, mesh)])
+
+
+def _contact(ctx: Context, model: Modele, material: MChaml | None) -> Any:
+    store = node_store(ctx)
+    parts = []
+    gaps: list[tuple[Any, FloatArray]] = []
+    for zone in model.contacts:
+        values = material.zone_of(zone) if material is not None else None
+        if zone.law == "COULOMB" and values is None:
+            raise ctx.operands.missing(MCHAML, "the friction coefficient (MATE MC 'MU' ...)")
+        pairs = _pairs(ctx, zone)
+        gap = pairs.gap
+        if values is not None and "JEU" in values.names:
+            gap = np.full(len(pairs.pairs), values.component("JEU")[0, 0])
+        mu = values.component("MU")[0, 0] if values is not None and zone.law == "COULOMB" else 0.0
+        multipliers = store.add(pairs.points)
+        parts.append(ContactPart(zone, pairs, np.full(len(pairs.pairs), mu), multipliers))
+        gaps.append((multipliers, gap))
+    nodes = np.concatenate([n for n, _ in gaps])
+    values_of_gaps = np.concatenate([g for _, g in gaps])
+    return Rigidite(parts), ChPoint(store, {"FLX": (nodes, values_of_gaps)}, "DISCRET")
+
+
+def _pairs(ctx: Context, zone: ContactZone) -> ContactPairs:
+    store = node_store(ctx)
+    dim = int(ctx.option("DIME"))
+    with worded(ctx, at="model"):
+        pairs = node_pairs(store.coords[:, :dim], zone.slave.kernel_blocks, zone.master.kernel_blocks)
+    if len(pairs.not_facing):
+        ctx.fail(
+            "G402",
+            "the surfaces do not face each other: their normals point the same way at {count} of {total} pairs",
+            at="model",
+            count=len(pairs.not_facing),
+            total=len(pairs.pairs),
+            hint="facets turn so that normals leave their solid: take them with FACE or ENVE, or turn one with ORIE",
+        )
+    smaller = min(len(pairs.unpaired_slave), len(pairs.unpaired_master))
+    if smaller:
+        ctx.warn(
+            "G401",
+            "{count} nodes of the smaller surface have no partner and stay free of contact",
+            at="model",
+            count=smaller,
+        )
+    return pairs
+
+
+UNION = extend("ET")
+
+
+@UNION.form(
+    Arg("a", RIGIDITE, "matrix"),
+    Arg("b", RIGIDITE, "matrix"),
+    Arg("more", RIGIDITE, "matrices", many=True, optional=True),
+    gives=[RIGIDITE],
+)
+def _et(ctx: Context, a: Rigidite, b: Rigidite, more: list[Rigidite]) -> Rigidite:
+    return Rigidite([part for each in (a, b, *more) for part in each.parts])
+
+
+@UNION.form(
+    Arg("a", MMODEL, "model"),
+    Arg("b", MMODEL, "model"),
+    Arg("more", MMODEL, "models", many=True, optional=True),
+    gives=[MMODEL],
+)
+def _et_models(ctx: Context, a: Modele, b: Modele, more: list[Modele]) -> Modele:
+    every = (a, b, *more)
+    return Modele([z for m in every for z in m.zones], [c for m in every for c in m.contacts])

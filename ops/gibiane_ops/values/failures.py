@@ -1,0 +1,77 @@
+"""Kernel errors to diagnostics: one table, so that every operator words a failure the same way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from gibiane.registry import Context
+
+from gibiane_ops.kernels import errors as k
+
+
+@contextmanager
+def worded(ctx: Context, *, at: str | None = None) -> Iterator[None]:
+    """Turn kernel errors raised inside into diagnostics about operand `at`."""
+    try:
+        yield
+    except k.InvertedElement as failure:
+        first = int(failure.ids[0])
+        where = ", ".join("(" + " ".join(f"{x:g}" for x in corner) + ")" for corner in failure.corners[0][:4])
+        ctx.fail(
+            195,
+            "{count} {shape} with a negative or zero Jacobian: first element {number}, Jacobian {value}, "
+            "corners {where}",
+            at=at,
+            count=len(failure.ids),
+            shape=failure.shape,
+            number=first + 1,
+            value=f"{failure.volumes[0]:.4g}",
+            where=where,
+            hint="its nodes turn the wrong way: ORIE turns elements round, INVE lines",
+        )
+    except k.BadValue as failure:
+        ctx.fail(
+            41,
+            "{what} = {value} is out of bounds: {limit}",
+            at=at,
+            what=failure.what,
+            value=failure.value,
+            limit=failure.limit,
+        )
+    except k.MissingPackage as failure:
+        ctx.fail(
+            "G201",
+            "the package {package} is not installed",
+            package=failure.package,
+            install=failure.install,
+            hint="{install}",
+        )
+    except k.MissingSystemLibrary as failure:
+        ctx.fail(
+            "G202",
+            "the system library {library} is missing",
+            library=failure.library,
+            package=failure.debian_package,
+            hint="on Debian: apt install {package}",
+        )
+    except k.ContradictoryConditions as failure:
+        rows = ", ".join(str(int(r) + 1) for r in failure.rows[:4])
+        ctx.fail(
+            "G407",
+            "conditions contradict each other (rows {rows}, by {gap})",
+            at=at,
+            rows=rows,
+            gap=f"{failure.residual:.3g}",
+            hint="two conditions prescribe different values of the same unknowns",
+        )
+    except k.EmptyContact as failure:
+        ctx.fail(
+            "G401",
+            "no contact pair: {reason}",
+            at=at,
+            reason=failure.reason,
+            hint="do the two surfaces touch, and is the first the master, the second the slave?",
+        )
+    except k.MeshingFailed as failure:
+        ctx.fail(27, "the mesher failed: {reason}", at=at, reason=failure.reason)

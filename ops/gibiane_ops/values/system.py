@@ -1,0 +1,201 @@
+"""From a RIGIDITE and its second members to a compact numbering, a sparse matrix, conditions and load vectors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+from gibiane.registry import Context
+
+from gibiane_ops.kernels.contact.pairs import ContactPairs, joined
+from gibiane_ops.values.champs import DIFFUS, ChPoint
+from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore, node_store
+from gibiane_ops.values.rigidite import ConditionPart, ContactPart, Rigidite
+
+
+@dataclass(eq=False)
+class System:
+    """A system ready for the kernels: unknown `d i + c` is component `names[c]` of node `nodes[i]`.
+
+    Attributes
+    ----------
+    store : NodeStore
+    nodes : (n,) int64, sorted
+    names, duals : tuple of str, length d
+    K : (n d, n d) csr_array
+    C : (m, n d) csr_array
+        Conditions, row by row of `conditions`.
+    conditions : list of ConditionPart
+    contacts : list of ContactPart
+    multipliers : (m,) int64
+        Node of the session that carries the value and the multiplier of each row of C.
+    """
+
+    store: NodeStore
+    nodes: IntArray
+    names: tuple[str, ...]
+    duals: tuple[str, ...]
+    K: sp.csr_array
+    C: sp.csr_array
+    conditions: list[ConditionPart]
+    contacts: list[ContactPart]
+    multipliers: IntArray
+
+    @property
+    def dim(self) -> int:
+        """Unknowns per node."""
+        return len(self.names)
+
+    @property
+    def points(self) -> FloatArray:
+        """Coordinates of the nodes, (n, d), length."""
+        return self.store.coords[self.nodes][:, : self.dim]
+
+    def load(self, ctx: Context, field: ChPoint, *, lenient: bool = False) -> tuple[FloatArray, FloatArray]:
+        """Split a second member into forces on the unknowns, (n d,), and values of the conditions, (m,).
+
+        Fails with error 53 (node without stiffness) or 54 (unknown that the matrix has not) unless `lenient`.
+        """
+        F = np.zeros(len(self.nodes) * self.dim)
+        imposed = np.zeros(len(self.multipliers))
+        own = np.concatenate([self.multipliers, *(part.multipliers for part in self.contacts)])
+        for name, (nodes, values) in field.parts.items():
+            if name == "FLX":
+                imposed = field.at("FLX", self.multipliers)
+                stray = np.setdiff1d(nodes[values != 0], own)
+                if len(stray) and not lenient:
+                    ctx.fail(
+                        53,
+                        "the load imposes {count} values on conditions that the matrix does not hold",
+                        at="f",
+                        count=len(stray),
+                        hint="join the conditions of BLOQ or RIGI to the matrix with ET",
+                    )
+                continue
+            if name not in self.duals:
+                if lenient or not values.any():
+                    continue
+                ctx.fail(
+                    54,
+                    "the load has a component {name}; the matrix knows {known}",
+                    at="f",
+                    name=name,
+                    known=" ".join(self.duals),
+                )
+            place = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
+            known = self.nodes[place] == nodes
+            if not known.all() and values[~known].any() and not lenient:
+                first = nodes[~known][np.flatnonzero(values[~known])[0]]
+                where = " ".join(f"{x:g}" for x in self.store.coords[first])
+                ctx.fail(
+                    53,
+                    "the load acts on {count} nodes without stiffness, the first at ({where})",
+                    at="f",
+                    count=int((values[~known] != 0).sum()),
+                    where=where,
+                )
+            F[place[known] * self.dim + self.duals.index(name)] += values[known]
+        return F, imposed
+
+    def gaps(self, field: ChPoint) -> FloatArray:
+        """Return the initial gaps of all contact pairs: those of the second member, else of the geometry."""
+        found = []
+        for part in self.contacts:
+            in_load = "FLX" in field.names and np.isin(part.multipliers, field.parts["FLX"][0]).all()
+            found.append(field.at("FLX", part.multipliers) if in_load else part.pairs.gap)
+        return np.concatenate(found)
+
+    def pairs(self, gap: FloatArray) -> ContactPairs:
+        """Return the pairs of all contact zones in the compact numbering, with these gaps."""
+        whole = joined([part.pairs for part in self.contacts])
+        ids = self.store.canonical(whole.pairs)
+        return replace(whole, pairs=np.searchsorted(self.nodes, ids), gap=gap)
+
+    def friction(self) -> FloatArray:
+        """Return the friction coefficient of every pair."""
+        return np.concatenate([part.mu for part in self.contacts])
+
+    def field(self, u: FloatArray, multipliers: FloatArray) -> ChPoint:
+        """Return the solution as a field: the unknowns on the nodes, LX on the multiplier nodes."""
+        table = u.reshape(-1, self.dim)
+        parts = {name: (self.nodes, table[:, i]) for i, name in enumerate(self.names)}
+        if len(multipliers):
+            parts["LX"] = (self.multipliers, multipliers)
+        return ChPoint(self.store, parts, DIFFUS)
+
+
+def build(ctx: Context, rigidity: Rigidite) -> System:
+    """Number the unknowns of a RIGIDITE and gather its matrices and conditions."""
+    store = node_store(ctx)
+    if not rigidity.matrices:
+        ctx.fail(26, "there is no stiffness among these conditions", at="k", hint="RIGI makes it from a model")
+    names = tuple(dict.fromkeys(n for part in rigidity.matrices for n in part.names))
+    duals = tuple(dict.fromkeys(n for part in rigidity.matrices for n in part.duals))
+    supports = [store.canonical(part.nodes) for part in rigidity.matrices]
+    nodes = np.unique(np.concatenate(supports))
+    size = len(nodes) * len(names)
+    K = sp.csr_array((size, size))
+    for number, (part, support) in enumerate(zip(rigidity.matrices, supports, strict=True)):
+        columns = np.array([names.index(n) for n in part.names])
+        place = (np.searchsorted(nodes, support)[:, None] * len(names) + columns).ravel()
+        whole = len(place) == size and bool((np.diff(place) == 1).all())
+        matrix = part.matrix if whole else _renumbered(part.matrix, place, size)
+        K = K + matrix if number else matrix
+    rows, cols, data, multipliers = [], [], [], []
+    start = 0
+    for condition in rigidity.conditions:
+        ids = store.canonical(condition.node)
+        place = np.minimum(np.searchsorted(nodes, ids), len(nodes) - 1)
+        lost = nodes[place] != ids
+        if lost.any():
+            where = " ".join(f"{x:g}" for x in store.coords[ids[lost][0]])
+            ctx.fail(
+                53,
+                "{label}: {count} of its nodes have no stiffness, the first at ({where})",
+                at="k",
+                label=condition.label,
+                count=int(lost.sum()),
+                where=where,
+            )
+        unknown = [str(n) for n in np.unique(condition.name) if str(n) not in names]
+        if unknown:
+            ctx.fail(
+                197,
+                "{label}: the matrix has no unknown {name}; it has {known}",
+                at="k",
+                label=condition.label,
+                name=unknown[0],
+                known=" ".join(names),
+            )
+        ordered = sorted(names)
+        column = np.array([names.index(n) for n in ordered])[np.searchsorted(ordered, condition.name)]
+        rows.append(condition.row + start)
+        cols.append(place * len(names) + column)
+        data.append(condition.coefficients)
+        multipliers.append(condition.multipliers)
+        start += len(condition.multipliers)
+    empty_ids = np.zeros(0, np.int64)
+    C = sp.csr_array(
+        (
+            np.concatenate([np.zeros(0), *data]),
+            (np.concatenate([empty_ids, *rows]), np.concatenate([empty_ids, *cols])),
+        ),
+        shape=(start, size),
+    )
+    return System(
+        store,
+        nodes,
+        names,
+        duals,
+        K,
+        C,
+        rigidity.conditions,
+        rigidity.contacts,
+        np.concatenate([empty_ids, *multipliers]),
+    )
+
+
+def _renumbered(matrix: sp.csr_array, place: IntArray, size: int) -> sp.csr_array:
+    entries = sp.coo_array(matrix)
+    return sp.csr_array((entries.data, (place[entries.row], place[entries.col])), shape=(size, size))
