@@ -85,7 +85,7 @@ def test_patch(name: str, seed: int) -> None:
     H = np.zeros((3, 3))
     H[:dim, :dim] = A
     constant = law(name) @ strain_vector((H + H.T) / 2, stress.shape[-1])
-    assert np.abs(stress - constant).max() < 1e-12 * np.abs(constant).max() * 10
+    assert np.abs(stress - constant).max() < 1e-11 * np.abs(constant).max()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -109,7 +109,7 @@ def test_single_elements_have_no_spurious_mode(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_symmetry(name: str) -> None:
     K = stiffness(name, *mesh(name, 5))
-    assert np.abs((K - K.T).data).max() <= 1e-15 * np.abs(K.data).max() * 10
+    assert np.abs((K - K.T).data).max() <= 1e-14 * np.abs(K.data).max()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -122,7 +122,7 @@ def test_numbering_changes_nothing(name: str) -> None:
     K = stiffness(name, points, cells)
     renumbered = stiffness(name, points[order], place[rng.permutation(cells)])
     unknowns = (order[:, None] * dim + np.arange(dim)).ravel()
-    assert np.abs(renumbered - K[unknowns][:, unknowns]).max() < 1e-14 * np.abs(K.data).max() * 10
+    assert np.abs(renumbered - K[unknowns][:, unknowns]).max() < 1e-13 * np.abs(K.data).max()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -161,7 +161,7 @@ def test_bar_under_traction(name: str, mode: str) -> None:
     reduction = reduce_conditions(fixed(supports, points.size))
     u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), reduction.load(K, load)))
     stretch = s / E * (1 - NU**2 if dim == 2 and mode == "DEFO" else 1.0)
-    assert np.allclose(u.reshape(-1, dim)[:, 0], stretch * points[:, 0], atol=1e-12 * 4 * stretch * 10)
+    assert np.allclose(u.reshape(-1, dim)[:, 0], stretch * points[:, 0], atol=1e-11 * stretch)
     stress = assembly.stresses(assembly.strains(each, points[cells], u.reshape(-1, dim)[cells], each.gauss[0]), D)
     assert np.allclose(stress[..., 0], s, rtol=1e-11)
     r = reduction.reactions(K, u, load).reshape(-1, dim)

@@ -158,3 +158,8 @@ def test_long_chain_of_ties() -> None:
     assert np.allclose(np.diff(u), 1.0, atol=1e-12)
     K = sp.eye_array(n, format="csr")
     assert reduction.matrix(K).toarray() == pytest.approx(n)
+
+
+def test_no_unknown_is_solved_for_through_a_small_coefficient() -> None:
+    reduction = reduce_conditions(conditions({0: 1e-6, 1: 1}, {1: 1, 2: 1, 3: 1e-6}))
+    assert np.abs(reduction.relation).max() <= 10.0

@@ -66,10 +66,12 @@ def test_a_corner_pushed_inside_is_found_at_its_integration_point() -> None:
 
 
 def test_flat_cells_are_found_in_spite_of_round_off() -> None:
-    flat = np.array([[[0.1, 0.2, 0.3], [1.1, 0.7, 0.9], [0.3, 1.9, 0.8], [0, 0, 0]]])
-    flat[0, 3] = flat[0, :3].mean(axis=0)
-    with pytest.raises(InvertedElement):
-        geometry.check_cells(shape("TET4"), flat)
+    corners = np.random.default_rng(6).uniform(-1, 1, (50, 4, 3))
+    corners[:, 3] = corners[:, :3].mean(axis=1)
+    assert (geometry.measures(shape("TET4"), corners) > 0).any()
+    with pytest.raises(InvertedElement) as caught:
+        geometry.check_cells(shape("TET4"), corners)
+    assert len(caught.value.ids) == 50
     thin = shape("CUB8").ref_nodes[None] * [1.0, 1.0, 1e-6]
     assert geometry.check_cells(shape("CUB8"), thin).min() > 0
 
