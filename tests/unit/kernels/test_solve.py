@@ -93,6 +93,27 @@ def test_a_slightly_wrong_package_is_refined(monkeypatch):
     assert factor.notes == ()
 
 
+@pytest.mark.parametrize("column", [0, 17, 39])
+def test_one_wrong_column_among_many_is_found(monkeypatch, column):
+    good = solve._superlu
+
+    def slips(A):
+        def wrong(b):
+            x = good(A)(b)
+            if b.ndim == 2 and b.shape[1] == 40:
+                x[3, column] *= 1.001
+            return x
+
+        return wrong
+
+    monkeypatch.setattr(solve, "_rslab", slips)
+    factor = factorize(chain(20))
+    b = np.random.default_rng(2).standard_normal((20, 40)) * 10.0 ** np.arange(-20, 20)
+    x = factor.solve(b)
+    assert factor.name == "superlu"
+    assert (np.abs(chain(20) @ x - b).max(axis=0) <= 1e-9 * np.abs(b).max(axis=0)).all()
+
+
 def test_a_failing_package_is_replaced(monkeypatch):
     def fails(A):
         if A[0, 0] == 2.0:
