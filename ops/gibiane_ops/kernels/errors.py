@@ -1,7 +1,5 @@
 """Exceptions raised by the kernels: each carries data, the operators turn it into words for the user."""
 
-# ruff: noqa: N818 -- the names say what happened (SingularSystem, NotConverged); all end up as diagnostics
-
 from __future__ import annotations
 
 from dataclasses import dataclass, field
