@@ -49,8 +49,7 @@ def solve_coulomb(
     tolerance : float
         Largest residual, in force, over the largest condensed load.
     max_iter : int
-        Newton steps of one attempt; full steps may be as many as twice the pairs, since slip may spread from pair to
-        pair, and stop when they no longer make progress.
+        Newton steps of one attempt; full steps go on up to twice the number of pairs while they make progress.
     start : ContactState, optional
         First guess, for instance at another coefficient; the tied bodies when left out.
     slip_origin : (n, d - 1) float64, optional
@@ -88,9 +87,12 @@ def solve_coulomb(
     law = _Law.of(interface, mu, gamma, slip_origin)
     history: list[float] = []
     first = _first_guess(law, interface, start)
-    best, last = _iterate(law, first, tolerance, max(max_iter, 2 * interface.n_pairs), history, damped=False)
+    best, last = _iterate(law, first, tolerance, max_iter, history, damped=False)
     if not best.converged:
         raise_if_unbalanced(interface, _state(law, interface, best, history, slip_origin))
+        # slip may spread from pair to pair, one a step: go on as long as there is progress
+        more, last = _iterate(law, (last.w, last.r), tolerance, 2 * interface.n_pairs, history, damped=False)
+        best = _better(best, more)
     soft = replace(law, gamma=min(gamma, SOFT_GAMMA))
     for attempt, damped in ((soft, False), (law, True), (soft, True)):
         if not best.converged:
