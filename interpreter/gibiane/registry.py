@@ -202,6 +202,8 @@ def _register(op: Operator) -> Operator:
     if key in table:
         raise TypeError(f"operator {op.name} is declared twice")
     table[key] = op
+    # its module may be imported for another of its operators, before anyone asks for this one
+    op.pending.extend(m for m in _MODULES.pop(op.name, [])[1:] if m not in sys.modules)
     return op
 
 
@@ -262,8 +264,6 @@ def _find_cached(word: str) -> Operator | None:
             declared = CATALOGUE.get(key) or LONG.get(name)
             if declared is None:
                 raise TypeError(f"{modules[0]} does not declare {name}")
-            del _MODULES[name]
-            declared.pending.extend(m for m in modules[1:] if m not in sys.modules)
             return declared
     return next((op for name, op in LONG.items() if word.startswith(name)), None)
 

@@ -1,0 +1,1 @@
+"""Operators of lists: one module per kind of work."""
