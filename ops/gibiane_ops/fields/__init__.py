@@ -1,0 +1,1 @@
+"""Operators on fields: arithmetic, components, extreme values, sums, supports."""

@@ -1,0 +1,187 @@
+"""Arithmetic of nodal and element fields: + - * / ** ET, and the functions of one variable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gibiane.forms import Arg
+from gibiane.registry import Context, Operator, extend
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTMOTS, MCHAML
+from gibiane_ops.values.algebra import Field, Incompatible, added, by_names, combined, joined, mapped, values_of
+from gibiane_ops.values.champs import ChPoint, MChaml
+from gibiane_ops.values.material import refused
+from gibiane_ops.values.nodes import FloatArray
+
+Number = int | float
+OPERAND = (CHPOINT, MCHAML, ENTIER, FLOTTANT)
+UFUNCS: dict[str, Callable[[FloatArray, Any], FloatArray]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+}
+
+
+def _two_fields(ctx: Context, symbol: str, a: Field, b: Field, names: list[Any]) -> Field:
+    if symbol == "/" and not len(values_of(b)):
+        ctx.fail(26, "the divisor is an empty field", at="b")
+    try:
+        if symbol in "+-":
+            return added(a, b, 1.0 if symbol == "+" else -1.0)
+        if symbol == "/":
+            _refuse_zeros(ctx, b, "b", [n for each in names[1:2] for n in each.words] or None)
+        if not names:
+            return combined(a, b, UFUNCS[symbol])
+        if len(names) != 3 or len({len(each.words) for each in names}) != 1:
+            ctx.fail(
+                212,
+                "three LISTMOTS of one length are wanted: components of the first field, of the second, of the result",
+                at="names",
+            )
+        return by_names(a, b, UFUNCS[symbol], *(each.words for each in names))
+    except Incompatible as failure:
+        refused(ctx, failure, "b")
+
+
+def _refuse_zeros(ctx: Context, field: Field, at: str, names: list[str] | None = None) -> None:
+    zeros = int((values_of(field, names) == 0).sum())
+    if zeros:
+        ctx.fail(26, "division by zero: {zeros} values of the divisor are zero", at=at, zeros=zeros)
+
+
+def _field_and_number(ctx: Context, symbol: str, a: Field | Number, b: Field | Number) -> Field:
+    if isinstance(a, Number) == isinstance(b, Number):
+        ctx.fail(
+            196,
+            "a nodal field and an element field cannot be put together",
+            at="b",
+            hint="CHAN makes one from the other",
+        )
+    if isinstance(b, ChPoint | MChaml):
+        if symbol == "/":
+            _refuse_zeros(ctx, b, "b")
+        return mapped(b, lambda v: UFUNCS[symbol](np.full_like(v, float(a)), v))  # type: ignore[arg-type]
+    if symbol == "/" and b == 0:
+        ctx.fail(26, "division by zero", at="b")
+    return mapped(a, lambda v: UFUNCS[symbol](v, float(b)))  # type: ignore[arg-type]
+
+
+def _arithmetic(symbol: str) -> None:
+    op = extend(symbol)
+    names = (
+        []
+        if symbol in "+-"
+        else [Arg("names", LISTMOTS, "components: of a, of b, of the result", many=True, optional=True)]
+    )
+
+    def of_fields(ctx: Context, a: Field, b: Field) -> Field:
+        return _two_fields(ctx, symbol, a, b, [])
+
+    def by_components(ctx: Context, a: Field, b: Field, names: list[Any]) -> Field:
+        return _two_fields(ctx, symbol, a, b, names)
+
+    for kind in (CHPOINT, MCHAML):
+        declare = op.form(Arg("a", kind, "field"), Arg("b", kind, "field"), *names, gives=[kind])
+        declare(by_components if names else of_fields)
+
+    @op.form(Arg("a", OPERAND, "field or number"), Arg("b", OPERAND, "field or number"), gives=["CHPOINT|MCHAML"])
+    def _with_number(ctx: Context, a: Field | Number, b: Field | Number) -> Field:
+        return _field_and_number(ctx, symbol, a, b)
+
+
+for _symbol in UFUNCS:
+    _arithmetic(_symbol)
+
+
+@extend("**").form(
+    Arg("a", (CHPOINT, MCHAML), "field"), Arg("b", (ENTIER, FLOTTANT), "exponent"), gives=["CHPOINT|MCHAML"]
+)
+def _power(ctx: Context, a: Field, b: Number) -> Field:
+    values = values_of(a)
+    if b < 0:
+        _refuse_zeros(ctx, a, "a")
+    negative = int((values < 0).sum())
+    if isinstance(b, float) and negative:
+        ctx.fail(213, "a real power of {count} negative values", at="a", count=negative)
+    return mapped(a, lambda v: np.asarray(v ** float(b), np.float64))
+
+
+UNION = extend("ET")
+
+
+@UNION.form(
+    Arg("a", CHPOINT, "field"),
+    Arg("b", CHPOINT, "field"),
+    Arg("more", CHPOINT, "fields", many=True, optional=True),
+    gives=[CHPOINT],
+)
+def _union(ctx: Context, a: Field, b: Field, more: list[Field]) -> Field:
+    total = added(a, b)
+    for each in more:
+        total = added(total, each)
+    return total
+
+
+@UNION.form(
+    Arg("a", MCHAML, "field"),
+    Arg("b", MCHAML, "field"),
+    Arg("more", MCHAML, "fields", many=True, optional=True),
+    gives=[MCHAML],
+)
+def _union_of_elements(ctx: Context, a: MChaml, b: MChaml, more: list[MChaml]) -> MChaml:
+    try:
+        total = joined(a, b)
+        for each in more:
+            total = joined(total, each)
+    except Incompatible as failure:
+        refused(ctx, failure, "b")
+    return total
+
+
+def _erf(v: FloatArray) -> FloatArray:
+    from scipy.special import erf
+
+    return np.asarray(erf(v), np.float64)
+
+
+FUNCTIONS: dict[str, tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], Any] | None]] = {
+    "ABS": (np.abs, None),
+    "SIGNE": (np.sign, None),
+    "SIN": (lambda v: np.sin(np.radians(v)), None),
+    "COS": (lambda v: np.cos(np.radians(v)), None),
+    "TAN": (lambda v: np.tan(np.radians(v)), lambda v: v % 180.0 != 90.0),
+    "ASIN": (lambda v: np.degrees(np.arcsin(v)), lambda v: np.abs(v) <= 1),
+    "ACOS": (lambda v: np.degrees(np.arccos(v)), lambda v: np.abs(v) <= 1),
+    "ATG": (lambda v: np.degrees(np.arctan(v)), None),
+    "EXP": (np.exp, lambda v: v < 709.78),
+    "LOG": (np.log, lambda v: v > 0),
+    "SINH": (np.sinh, lambda v: np.abs(v) < 710),
+    "COSH": (np.cosh, lambda v: np.abs(v) < 710),
+    "TANH": (np.tanh, None),
+    "ERF": (_erf, None),
+}
+
+
+def _function(
+    op: Operator, function: Callable[[FloatArray], FloatArray], allowed: Callable[[FloatArray], Any] | None
+) -> None:
+    @op.form(Arg("x", (CHPOINT, MCHAML), "field"), gives=["CHPOINT|MCHAML"])
+    def _apply(ctx: Context, x: Field) -> Field:
+        if allowed is not None:
+            outside = int((~allowed(values_of(x))).sum())
+            if outside:
+                ctx.fail(
+                    26,
+                    "{count} values of the field are outside the range of {name}",
+                    at="x",
+                    count=outside,
+                    name=op.name,
+                )
+        return mapped(x, function)
+
+
+for _name, (_fn, _allowed) in FUNCTIONS.items():
+    _function(extend(_name), _fn, _allowed)

@@ -1,0 +1,313 @@
+"""Strains, stresses and what is made of them: EPSI SIGM ELAS BSIG ENER VMIS PRIN INVA TRESCA."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, operator
+from gibiane.values import CHPOINT, MCHAML, MMODEL
+from gibiane_ops.kernels import assembly, invariants
+from gibiane_ops.kernels.arrays import strain_tensor, stress_tensor
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.supports import moved
+from gibiane_ops.values.algebra import SCAL, SCALAIRE
+from gibiane_ops.values.champs import DISCRET, ChamZone, ChPoint, MChaml
+from gibiane_ops.values.failures import worded
+from gibiane_ops.values.material import (
+    MATERIAL,
+    STRAIN,
+    STRESS,
+    elastic_compliance,
+    elastic_law,
+    on_zone,
+    solid_zones,
+    told_apart,
+)
+from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, STRAINS, STRESSES, Modele, ModelZone
+from gibiane_ops.values.nodes import FloatArray, node_store
+
+PRINCIPAL = "PRINCIPALE"
+COSINES = tuple(f"{axis}{k}" for k in (1, 2, 3) for axis in ("COX", "COY", "COZ"))
+BLOCK = """OPTI DIME 3 ELEM CUB8 ;
+S = (DROI 1 (0. 0. 0.) (1. 0. 0.)) TRAN 1 (0. 1. 0.) ; V = S VOLU 1 'TRAN' (0. 0. 1.) ;
+MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;
+U = NOMC 'UZ' (1.E-3 * (COOR 3 V)) ;
+"""
+
+LINEAR = Key(("LINE", "QUAD"), "linear strains (the default)", name="how")
+
+
+def _strains(ctx: Context, zone: ModelZone, u: ChPoint) -> FloatArray:
+    of = shape(zone.shape)
+    names = DISPLACEMENTS[zone.family]
+    if not set(names) & set(u.names):
+        ctx.fail(
+            181,
+            "the field has no displacement ({wanted}); it has {known}",
+            at="u",
+            wanted=" ".join(names),
+            known=" ".join(u.names) or "no component",
+        )
+    corners = node_store(ctx).coords[zone.cells][..., : zone.dim]
+    nodal = u.table(names, zone.cells.ravel()).reshape(*zone.cells.shape, len(names))
+    with worded(ctx, at="model"):
+        return assembly.strains(of, corners, nodal, of.gauss[0])
+
+
+def _check_linear(ctx: Context, how: str | None) -> None:
+    if how == "QUAD":
+        ctx.fail(251, "quadratic strains are not available yet", at="how", hint="'LINE' is the default")
+
+
+EPSI = operator(
+    "EPSI",
+    topic="fields",
+    summary="strains of a displacement field",
+    notice="An element field of sub-type DEFORMATIONS at the stress points: EPXX EPYY EPZZ GAXY GAXZ GAYZ in "
+    "space, EPXX EPYY EPZZ GAXY in the plane (engineering shears). In plane stress EPZZ is 0: ELAS of "
+    "the stresses gives it.",
+    example=BLOCK + "MESS (MAXI (EXCO 'EPZZ' (EPSI MO U))) ;",
+    see=["SIGMA", "ELAS"],
+)
+
+
+@EPSI.form(
+    Arg("model", MMODEL, "model"), Arg("u", CHPOINT, "displacement"), LINEAR, Key("NOER", "accepted"), gives=[MCHAML]
+)
+def _epsi(ctx: Context, model: Modele, u: ChPoint, how: str | None, noer: bool) -> MChaml:
+    _check_linear(ctx, how)
+    zones = [ChamZone(z, STRAINS[z.family], _strains(ctx, z, u)) for z in solid_zones(ctx, model)]
+    return MChaml(zones, STRAIN, "STRESSES")
+
+
+SIGM = operator(
+    "SIGMA",
+    topic="fields",
+    summary="stresses of a displacement field",
+    notice="An element field of sub-type CONTRAINTES at the stress points: SMXX SMYY SMZZ SMXY SMXZ SMYZ in "
+    "space, SMXX SMYY SMZZ SMXY in the plane, by the elastic law of the material.",
+    example=BLOCK + "MESS (MAXI (EXCO 'SMZZ' (SIGM MO MA U))) ;",
+    see=["EPSI", "VMIS", "ERREUR"],
+)
+
+
+@SIGM.form(
+    Arg("model", MMODEL, "model"),
+    Arg("material", MCHAML, "material"),
+    Arg("u", CHPOINT, "displacement"),
+    LINEAR,
+    gives=[MCHAML],
+)
+def _sigm(ctx: Context, model: Modele, material: MChaml, u: ChPoint, how: str | None) -> MChaml:
+    _check_linear(ctx, how)
+    (material,) = told_apart(ctx, [("material", material)], MATERIAL)
+    zones = []
+    for zone in solid_zones(ctx, model):
+        law = elastic_law(ctx, material, zone, "material")
+        zones.append(ChamZone(zone, STRESSES[zone.family], assembly.stresses(_strains(ctx, zone, u), law)))
+    return MChaml(zones, STRESS, "STRESSES")
+
+
+ELAS = operator(
+    "ELAS",
+    topic="fields",
+    summary="stresses from strains, or strains from stresses",
+    notice="Elastic law: a field of sub-type DEFORMATIONS gives CONTRAINTES, and conversely.",
+    example=BLOCK + "MESS (MAXI (EXCO 'EPZZ' (ELAS MO (SIGM MO MA U) MA))) ;",
+    see=["EPSI", "SIGMA"],
+)
+
+
+@ELAS.form(
+    Arg("model", MMODEL, "model"),
+    Arg("field", MCHAML, "strains or stresses"),
+    Arg("material", MCHAML, "material"),
+    gives=[MCHAML],
+)
+def _elas(ctx: Context, model: Modele, field: MChaml, material: MChaml) -> MChaml:
+    given = (("field", field), ("material", material))
+    source = STRAIN if STRAIN in (field.subtype, material.subtype) else STRESS
+    field, material = told_apart(ctx, given, source, MATERIAL)
+    law, names, target = (elastic_law, STRESSES, STRESS) if source == STRAIN else (elastic_compliance, STRAINS, STRAIN)
+    zones = []
+    for zone in solid_zones(ctx, model):
+        values = on_zone(ctx, field, zone, "field").values
+        zones.append(
+            ChamZone(zone, names[zone.family], assembly.stresses(values, law(ctx, material, zone, "material")))
+        )
+    return MChaml(zones, target, field.support)
+
+
+BSIG = operator(
+    "BSIGMA",
+    topic="fields",
+    summary="nodal forces that balance a stress field",
+    notice="The integral of B^T sigma: internal forces, a field of nature DISCRET. Applied loads and reactions "
+    "are in balance with it: F + REAC - BSIG = 0.",
+    example=BLOCK + "F = BSIG MO (SIGM MO MA U) ; MESS (MAXI (RESU (EXCO 'FZ' F)) < 1.E-3) ;",
+    see=["SIGMA", "REAC", "RESULT"],
+)
+
+
+@BSIG.form(
+    Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("more", MCHAML, optional=True), gives=[CHPOINT]
+)
+def _bsig(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> ChPoint:
+    (stress,) = told_apart(ctx, [("stress", stress), ("more", more)], STRESS)
+    store = node_store(ctx)
+    zones = solid_zones(ctx, model)
+    dim, names = zones[0].dim, FORCES[zones[0].family]
+    parts = []
+    for zone in zones:
+        of = shape(zone.shape)
+        values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
+        with worded(ctx, at="model"):
+            parts.append((zone.cells, assembly.internal_forces(of, store.coords[zone.cells][..., :dim], values)))
+    nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in parts]))
+    local = [(np.searchsorted(nodes, cells), forces) for cells, forces in parts]
+    total = assembly.assemble_vector(len(nodes), dim, local).reshape(-1, dim)
+    return ChPoint.from_table(store, names, nodes, total, DISCRET)
+
+
+ENER = operator(
+    "ENERGIE",
+    topic="fields",
+    summary="density of energy: stress times strain",
+    notice="`ENER MODL SIG EPS` is sigma : epsilon at the stress points, without the factor 1/2; its integral "
+    "(INTG) is twice the elastic energy.",
+    example=BLOCK + "MESS (INTG MO (ENER MO (SIGM MO MA U) (EPSI MO U))) ;",
+    see=["INTG", "SIGMA"],
+)
+
+
+@ENER.form(
+    Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("strain", MCHAML, "strain"), gives=[MCHAML]
+)
+def _ener(ctx: Context, model: Modele, stress: MChaml, strain: MChaml) -> MChaml:
+    stress, strain = told_apart(ctx, [("stress", stress), ("strain", strain)], STRESS, STRAIN)
+    zones = []
+    for zone in solid_zones(ctx, model):
+        a, b = on_zone(ctx, stress, zone, "stress").values, on_zone(ctx, strain, zone, "strain").values
+        a, b = (moved(shape(zone.shape), v, f.support, "STRESSES") for v, f in ((a, stress), (b, strain)))
+        zones.append(ChamZone(zone, [SCAL], (a * b).sum(axis=2, keepdims=True)))
+    return MChaml(zones, SCALAIRE, "STRESSES")
+
+
+def _scalar(
+    ctx: Context, model: Modele, fields: list[tuple[str, MChaml | None]], measure: Callable[[FloatArray], FloatArray]
+) -> MChaml:
+    """Return the element field that a formula gives of a stress, on the support of the stress."""
+    (stress,) = told_apart(ctx, fields, STRESS)
+    zones = [
+        ChamZone(z, [SCAL], measure(on_zone(ctx, stress, z, "stress").values)[..., None])
+        for z in solid_zones(ctx, model)
+    ]
+    return MChaml(zones, SCALAIRE, stress.support)
+
+
+VMIS = operator(
+    "VMISES",
+    topic="fields",
+    summary="equivalent stress of von Mises",
+    notice="An element field with the component SCAL, on the support of the stress.",
+    example=BLOCK + "MESS (MAXI (VMIS MO (SIGM MO MA U))) ;",
+    see=["SIGMA", "TRESCA", "PRIN"],
+)
+TRES = operator(
+    "TRESCA",
+    topic="fields",
+    summary="equivalent stress of Tresca",
+    notice="The largest difference of two principal stresses: an element field with the component SCAL.",
+    example=BLOCK + "MESS (MAXI (TRES MO (SIGM MO MA U))) ;",
+    see=["SIGMA", "VMISES", "PRIN"],
+)
+
+
+@VMIS.form(
+    Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("more", MCHAML, optional=True), gives=[MCHAML]
+)
+def _vmis(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> MChaml:
+    return _scalar(ctx, model, [("stress", stress), ("more", more)], invariants.von_mises)
+
+
+@TRES.form(
+    Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("more", MCHAML, optional=True), gives=[MCHAML]
+)
+def _tres(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> MChaml:
+    return _scalar(ctx, model, [("stress", stress), ("more", more)], invariants.tresca)
+
+
+def _tensor(ctx: Context, field: MChaml, zone: ModelZone) -> FloatArray:
+    """Return the tensors of a field of stresses or strains on a zone, (m, q, 3, 3)."""
+    values = on_zone(ctx, field, zone, "field").values
+    return strain_tensor(values) if field.subtype == STRAIN else stress_tensor(values)
+
+
+def _tensor_field(ctx: Context, field: MChaml, more: MChaml | None) -> MChaml:
+    found = next((f for f in (field, more) if f is not None and f.subtype in (STRESS, STRAIN)), None)
+    if found is None:
+        ctx.fail(
+            565,
+            "a field of stresses or of strains is wanted, not of sub-type {subtype}",
+            at="field",
+            subtype=field.subtype,
+        )
+    return found
+
+
+PRIN = operator(
+    "PRINCIPAL",
+    topic="fields",
+    summary="principal stresses or strains and their directions",
+    notice="Components SI11 >= SI22 >= SI33 and the direction cosines COX1 COY1 COZ1 ... COZ3. In the plane "
+    "the third value is the one across the plane, unless 'TRID' asks for all three in order.",
+    example=BLOCK + "MESS (MAXI (EXCO 'SI11' (PRIN MO (SIGM MO MA U)))) ;",
+    see=["SIGMA", "VMISES", "INVARIANTS"],
+)
+
+
+@PRIN.form(
+    Arg("model", MMODEL, "model"),
+    Arg("field", MCHAML, "stresses or strains"),
+    Arg("more", MCHAML, optional=True),
+    Key("TRID", "order the three values also in the plane"),
+    gives=[MCHAML],
+)
+def _prin(ctx: Context, model: Modele, field: MChaml, more: MChaml | None, trid: bool) -> MChaml:
+    source = _tensor_field(ctx, field, more)
+    zones = []
+    for zone in solid_zones(ctx, model):
+        tensor = _tensor(ctx, source, zone)
+        values, axes = invariants.principal(tensor, in_plane=zone.dim == 2 and not trid)
+        stacked = np.concatenate([values, axes.reshape(*values.shape[:2], 9)], axis=2)
+        zones.append(ChamZone(zone, ("SI11", "SI22", "SI33", *COSINES), stacked))
+    return MChaml(zones, PRINCIPAL, source.support)
+
+
+INVA = operator(
+    "INVARIANTS",
+    topic="fields",
+    summary="three invariants of a stress or strain field",
+    notice="Three element fields: trace, sum of the principal minors, determinant.",
+    example=BLOCK + "I1 I2 I3 = INVA MO (SIGM MO MA U) ; MESS (MAXI I1) ;",
+    see=["PRINCIPAL"],
+)
+
+
+@INVA.form(
+    Arg("model", MMODEL, "model"),
+    Arg("field", MCHAML, "stresses or strains"),
+    Arg("more", MCHAML, optional=True),
+    gives=[MCHAML, MCHAML, MCHAML],
+)
+def _inva(ctx: Context, model: Modele, field: MChaml, more: MChaml | None) -> tuple[MChaml, MChaml, MChaml]:
+    source = _tensor_field(ctx, field, more)
+    zones: list[list[ChamZone]] = [[], [], []]
+    for zone in solid_zones(ctx, model):
+        for column, values in zip(zones, invariants.invariants(_tensor(ctx, source, zone)), strict=True):
+            column.append(ChamZone(zone, [SCAL], values[..., None]))
+    first, second, third = (MChaml(each, SCALAIRE, source.support) for each in zones)
+    return first, second, third
