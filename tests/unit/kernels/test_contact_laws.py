@@ -52,6 +52,26 @@ def test_spring_closing_a_gap(f, gap):
     np.testing.assert_allclose(found.r, [[2 * w - f, 0, 0]], atol=1e-12)
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_press_fit_without_any_load(unit):
+    # an overlap of 0.3 pushes the spring of stiffness 2 back by 0.3, in any unit of length
+    interface = bare_interface(np.diag([2.0, 2.0, 2.0]), np.zeros(3), 3, np.array([-0.3 * unit]))
+    found = solve_coulomb(interface, 0.3)
+    np.testing.assert_allclose(found.w, [[-0.3 * unit, 0, 0]], rtol=1e-12)
+    np.testing.assert_allclose(found.r, [[-0.6 * unit, 0, 0]], rtol=1e-12)
+
+
+def test_frictionless_drift_is_zero():
+    # nothing holds the tangential motions together: only their difference matters
+    S = np.diag([4.0, 1.0, 4.0, 1.0])
+    S[1, 3] = S[3, 1] = -1.0
+    interface = bare_interface(S, np.array([10, 0.7, 6, -0.7]), 2)
+    base = solve_tied(interface)
+    moved = ContactState(np.array([[0, 5.0], [0, 5.0]]), base.r, base.status, base.mu, [], base.report)
+    for start in (None, moved):
+        np.testing.assert_allclose(solve_coulomb(interface, 0.0, start=start).w, [[0, 0.35], [0, -0.35]], atol=1e-12)
+
+
 def test_slip_of_an_elastic_pair():
     # pressed by 10, pulled by 4 along (3, 4)/5 with mu = 0.2: friction takes 2, the spring of stiffness 5 the rest
     interface = bare_interface(np.diag([7.0, 5.0, 5.0]), np.array([10, 2.4, 3.2]), 3)

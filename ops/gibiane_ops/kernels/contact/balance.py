@@ -111,7 +111,8 @@ def raise_if_runaway(interface: Interface, last: ContactState, best: ContactStat
     size = float(np.abs(motion).max(initial=0))
     if size > RUNAWAY * interface.length_scale > 0:
         r = radial_projection(last.r, last.mu)
-        share = float(np.linalg.norm(R.T @ (interface.f + r.ravel())) / np.linalg.norm(R.T @ interface.f))
+        load = float(np.linalg.norm(R.T @ interface.f)) or interface.force_scale
+        share = float(np.linalg.norm(R.T @ (interface.f + r.ravel()))) / load
         motion = motion / size
         raise ContactUnbalanced(kind_of_motion(motion, last.mu), share, motion, best.history, best)
 

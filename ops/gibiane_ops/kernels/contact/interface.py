@@ -63,8 +63,8 @@ class Interface:
 
     @property
     def force_scale(self) -> float:
-        """Largest entry of the condensed load."""
-        return float(np.abs(self.f).max(initial=0.0))
+        """Largest entry of the condensed load, or the force that closes the largest overlap if this is more."""
+        return float(max(np.abs(self.f).max(initial=0.0), self.kref * (-self.gap).max(initial=0.0)))
 
     @property
     def length_scale(self) -> float:

@@ -271,14 +271,12 @@ def _grow_friction(
     law: _Law, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: list[float]
 ) -> _Iterate:
     """Follow the solution from small coefficients to the given ones."""
-    found = first
-    last: _Iterate | None = None
-    for part in (0.1, 0.25, 0.5, 0.75, 0.9, 1.0):
+    guess = first
+    for part in (0.1, 0.25, 0.5, 0.75, 0.9):
         milder = replace(law, mu=part * law.mu)
-        last = _iterate(milder, found, tolerance, max_iter, history, damped=True)[0]
-        found = last.w, last.r
-    assert last is not None
-    return last
+        found = _iterate(milder, guess, tolerance, max_iter, history, damped=True)[0]
+        guess = found.w, found.r
+    return _iterate(law, guess, tolerance, max_iter, history, damped=True)[0]
 
 
 def _state(
@@ -287,7 +285,7 @@ def _state(
     """Go back to physical units and measure the result."""
     w = found.w * law.force / interface.kref
     if not law.mu.any():
-        w = _without_drift(w, found.status, interface)
+        w = _without_drift(w, interface)
     return check_state(interface, w, found.r * law.force, found.status, law.mu, history, slip_origin)
 
 
@@ -306,14 +304,13 @@ def _better(a: _Iterate, b: _Iterate) -> _Iterate:
     return b if b.residual < a.residual else a
 
 
-def _without_drift(w: FloatArray, status: IntArray, interface: Interface) -> FloatArray:
+def _without_drift(w: FloatArray, interface: Interface) -> FloatArray:
     """Remove the part of w that slides freely without friction: no force opposes it, so nothing fixes it."""
     R = interface.rigid
-    held = np.zeros(w.shape, dtype=bool)
-    held[status != OPEN, 0] = True
-    if R.shape[1] == 0 or not held.any():
+    if R.shape[1] == 0:
         return w
-    _, values, Vt = np.linalg.svd(R[held.ravel()], full_matrices=True)
+    # motions along the surface only: those that change a gap are settled by the normal forces
+    _, values, Vt = np.linalg.svd(R[:: w.shape[1]], full_matrices=True)
     still = np.r_[values, np.zeros(len(Vt) - len(values))] <= 1e-9
     D = R @ Vt[still].T
     return np.asarray(w - (D @ (D.T @ w.ravel())).reshape(w.shape))
