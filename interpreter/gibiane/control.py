@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from gibiane import procedures
+from gibiane import compiled, procedures
 from gibiane.blocks import block_name, block_names
 from gibiane.diagnostics import GibianeError, make
-from gibiane.frames import Loop, Stop
+from gibiane.frames import Frame, Loop, Stop
 from gibiane.nodes import Instr, Literal, Name, Node
 from gibiane.values import LOGIQUE
 
@@ -28,6 +29,36 @@ def _without_head(instr: Instr) -> list[Node]:
 
 def _if(ev: Evaluator, program: list[Instr], pc: int) -> int:
     instr = program[pc]
+    code = instr.code
+    if code is None or code is False:
+        code = instr.code = _condition(instr)
+    holds = code(ev.frame)
+    if holds is None:
+        holds = _condition_by_queue(ev, instr)
+    if holds:
+        return pc + 1
+    if instr.jump is not None:
+        return instr.jump + 1
+    raise GibianeError(make(1023, "this SI is never closed", operator="SI", span=instr.span(),
+                            hint="write its FINSI"))
+
+
+def _condition(instr: Instr) -> Callable[[Frame], bool | None]:
+    """Return a closure for the condition of an SI; it gives None when the queue must do the work."""
+    fetch = compiled.condition(_without_head(instr))
+
+    def holds(frame: Frame) -> bool | None:
+        if fetch is None:
+            return None
+        try:
+            return bool(fetch(frame))
+        except (compiled.Fallback, ArithmeticError):
+            return None
+
+    return holds
+
+
+def _condition_by_queue(ev: Evaluator, instr: Instr) -> bool:
     q = ev.operands(instr.source, _without_head(instr))
     ev.resolve_accesses(q)
     condition = q.read(LOGIQUE)
@@ -41,12 +72,7 @@ def _if(ev: Evaluator, program: list[Instr], pc: int) -> int:
         failure.diagnostic.operator = "SI"
         failure.diagnostic.hint = make(11, "", hint="put the whole condition between parentheses").hint
         raise failure
-    if condition:
-        return pc + 1
-    if instr.jump is not None:
-        return instr.jump + 1
-    raise GibianeError(make(1023, "this SI is never closed", operator="SI", span=instr.span(),
-                            hint="write its FINSI"))
+    return bool(condition)
 
 
 def _else(ev: Evaluator, program: list[Instr], pc: int) -> int:
@@ -93,7 +119,7 @@ def _repeat(ev: Evaluator, program: list[Instr], pc: int) -> int:
                                 span=label.span))
     if count == 0:
         return instr.jump + 1
-    frame.loops.append(Loop(name, pc, instr.jump, -1 if count is None else count))
+    frame.loops.append(Loop(name, program, pc, instr.jump, -1 if count is None else count))
     frame.names["&" + name[:23]] = 1
     return pc + 1
 
@@ -109,13 +135,7 @@ def _end(ev: Evaluator, program: list[Instr], pc: int) -> int:
         raise GibianeError(make(154, "{name} is not the innermost active loop", operator="FIN", name=name,
                                 span=instr.span(), inside=inside,
                                 hint="the innermost is {inside}" if inside else "no loop is active here"))
-    loop = loops[-1]
-    loop.count += 1
-    ev.frame.names["&" + name[:23]] = loop.count
-    if 0 <= loop.limit < loop.count:
-        loops.pop()
-        return pc + 1
-    return loop.start + 1
+    return loops[-1].turn(ev.frame)
 
 
 def _leave(ev: Evaluator, program: list[Instr], pc: int, word: str) -> tuple[int, Loop | None]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gibiane import control, objects, procedures
+from gibiane import compiled, control, objects, procedures
 from gibiane.binding import ABSENT, DOT, PERCENT, Mark, Operands
 from gibiane.diagnostics import FATAL, GibianeError, make, nearest
 from gibiane.frames import Frame
@@ -28,7 +28,7 @@ class Evaluator:
 
     def __init__(self, session: Session) -> None:
         self.session = session
-        self.frame: Frame = Frame(None, None)
+        self.frame: Frame = Frame(self, None, None)
         self.current: Instr | None = None
         self._echoed: tuple[SourceText | None, int] = (None, 0)
 
@@ -42,9 +42,21 @@ class Evaluator:
     def execute(self, program: list[Instr], pc: int, end: int, *, echo: bool = False) -> None:
         """Run instructions [pc, end) of a program; control instructions move `pc`."""
         frame = self.frame
+        loops = frame.loops
         handlers = control.HANDLERS
         while pc < end:
             instr = program[pc]
+            code = instr.code
+            if code is None:
+                code = instr.code = compiled.instruction(instr) or False
+            head = instr.head
+            if head is None:
+                if code and code(frame):
+                    pc += 1
+                    continue
+            elif head == "FIN" and loops and loops[-1].end == pc and loops[-1].program is program:
+                pc = loops[-1].turn(frame)
+                continue
             self.current = instr
             if echo and self.session.options["ECHO"] >= 1:
                 self._echo(instr)
@@ -97,8 +109,12 @@ class Evaluator:
     def instruction(self, instr: Instr) -> None:
         """Run a directive or an assignment."""
         q = self.operands(instr.source, instr.items)
+        self.evaluate(q, len(instr.targets))
+        self.finish(instr, q)
+
+    def finish(self, instr: Instr, q: Operands) -> None:
+        """Bind what an evaluated queue holds to the targets; fail when too much or too little is left."""
         targets = instr.targets
-        self.evaluate(q, len(targets))
         if not targets:
             if len(q.values) > 1:
                 raise self.leftover(q, 1)
@@ -211,16 +227,15 @@ class Evaluator:
     def evaluate(self, q: Operands, n_targets: int) -> None:
         """Apply the evaluation rule to a queue until no operator is left to run."""
         while True:
-            if DOT in q.values or PERCENT in q.values:
+            kinds = {type(value) for value in q.values}
+            if Mark in kinds:
                 self.resolve_accesses(q)
-            i = q.first_word()
+            i = q.first_word() if str in kinds or Procedure in kinds else -1
             op: Operator | None = None
             if i >= 0 and type(q.values[i]) is str:
                 op = find(q.values[i])
-            if op is None or op.name not in KEEPS_TEXT:
-                expanded = self._expand_texts(q)
-                if expanded:
-                    continue
+            if Texte in kinds and (op is None or op.name not in KEEPS_TEXT) and self._expand_texts(q):
+                continue
             if i < 0:
                 break
             node = q.nodes[i]
@@ -232,6 +247,8 @@ class Evaluator:
                     continue
                 break
             del q.values[i], q.nodes[i]
+            if op.symbolic and compiled.reduce_front(op.name, q.values, q.nodes, node):
+                continue
             try:
                 op.run(self.session, q, node)
             except GibianeError as failure:
@@ -350,6 +367,10 @@ class Evaluator:
                                    hint="quote the operator to call it all the same: '{short}'", short=op.name[:4]))
 
     # -- procedures ------------------------------------------------------------------------------------------
+
+    def call_with_numbers(self, procedure: Procedure, values: list[Any], instr: Instr, node: Node) -> list[Any] | None:
+        """Call a procedure for the closures (see :mod:`gibiane.compiled`)."""
+        return procedures.call_with_numbers(self, procedure, values, instr, node)
 
     def call_values(self, procedure: Any, arguments: list[Any], span: Span) -> list[Any]:
         """Call a procedure (object or name) with given values, for an operator."""

@@ -16,22 +16,35 @@ class Stop(Exception):
 class Loop:
     """An active REPE block."""
 
-    __slots__ = ("count", "end", "limit", "name", "start")
+    __slots__ = ("count", "counter", "end", "limit", "name", "program", "start")
 
-    def __init__(self, name: str, start: int, end: int, limit: int) -> None:
+    def __init__(self, name: str, program: list[Instr], start: int, end: int, limit: int) -> None:
         self.name = name
+        self.counter = "&" + name[:23]
+        self.program = program
         self.start = start
         self.end = end
         self.limit = limit
         self.count = 1
 
+    def turn(self, frame: Frame) -> int:
+        """Do what FIN does: count a turn, and return the index of the next instruction (the loop may be over)."""
+        self.count = count = self.count + 1
+        frame.names[self.counter] = count
+        if 0 <= self.limit < count:
+            frame.loops.pop()
+            return self.end + 1
+        return self.start + 1
+
 
 class Frame:
     """The names of one call (or of the session), on top of the caller's."""
 
-    __slots__ = ("arguments", "depth", "loops", "names", "origins", "parent", "procedure", "quitting", "results", "this")
+    __slots__ = ("arguments", "depth", "evaluator", "loops", "names", "origins", "parent", "procedure", "quitting",
+                 "results", "this")
 
-    def __init__(self, parent: Frame | None, procedure: Procedure | None) -> None:
+    def __init__(self, evaluator: Any, parent: Frame | None, procedure: Procedure | None) -> None:
+        self.evaluator = evaluator
         self.parent = parent
         self.procedure = procedure
         self.names: dict[str, Any] = {}

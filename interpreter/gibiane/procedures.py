@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from gibiane import compiled
 from gibiane.binding import ABSENT, Operands
 from gibiane.blocks import annotate, check_structure
 from gibiane.diagnostics import GibianeError, make
@@ -11,7 +12,7 @@ from gibiane.frames import Frame
 from gibiane.nodes import Instr, Literal, Name, Node
 from gibiane.source import Span
 from gibiane.syntax import parse
-from gibiane.values import ANY, FLOTTANT, NOTHING, Parameter, Procedure
+from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Parameter, Procedure
 
 if TYPE_CHECKING:
     from gibiane.evaluator import Evaluator
@@ -104,31 +105,70 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
 
 def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:
     """Call a procedure with operands read from the caller's queue; push its results in front."""
-    caller = ev.frame
     span = q.span(node)
-    if caller.depth >= MAX_DEPTH:
-        raise GibianeError(make("G103", "calls are nested deeper than {limit}: does {name} call itself without end?",
-                                limit=MAX_DEPTH, name=procedure.name, span=span))
-    frame = Frame(caller, procedure)
+    frame = enter(ev, procedure, span)
     frame.arguments = q
-    instr = ev.current
     for parameter in procedure.parameters:
         _read_parameter(frame.names, parameter, q, procedure, span)
+    q.push_front(run(ev, frame, span), node)
+
+
+def enter(ev: Evaluator, procedure: Procedure, span: Span) -> Frame:
+    """Return the frame of a new call, on top of the current one."""
+    if ev.frame.depth >= MAX_DEPTH:
+        raise GibianeError(make("G103", "calls are nested deeper than {limit}: does {name} call itself without end?",
+                                limit=MAX_DEPTH, name=procedure.name, span=span))
+    return Frame(ev, ev.frame, procedure)
+
+
+def run(ev: Evaluator, frame: Frame, span: Span) -> list[Any]:
+    """Run the body of the procedure of a frame whose arguments are set; return its results."""
+    procedure = frame.procedure
+    if procedure is None:
+        return []
+    caller, instr = ev.frame, ev.current
     ev.frame = frame
     try:
-        ev.execute(procedure.program, procedure.start, procedure.end)
+        if procedure.start < procedure.end:
+            ev.execute(procedure.program, procedure.start, procedure.end)
         final = procedure.program[procedure.end]
         ev.current = final
-        if final.bad is not None:
-            raise GibianeError(final.bad)
-        frame.results.extend(results_of(ev, final, final.items, skip_undefined=frame.quitting))
+        code = final.code
+        if code is None:
+            code = final.code = compiled.result(final) or False
+        value = code(frame) if code and not frame.quitting else None
+        if value is not None:
+            frame.results.append(value)
+        else:
+            if final.bad is not None:
+                raise GibianeError(final.bad)
+            frame.results.extend(results_of(ev, final, final.items, skip_undefined=frame.quitting))
     except GibianeError as failure:
         failure.diagnostic.trace.append((procedure.name, span))
         raise
     finally:
         ev.frame = caller
         ev.current = instr
-    q.push_front(frame.results, node)
+    return frame.results
+
+
+def call_with_numbers(ev: Evaluator, procedure: Procedure, values: list[Any], instr: Instr, node: Node) -> list[Any] | None:
+    """Call a procedure with numbers that are its parameters one by one; None when they are not (nothing has run)."""
+    parameters = procedure.parameters
+    if len(parameters) != len(values):
+        return None
+    for i, parameter in enumerate(parameters):
+        wanted = parameter.type_name
+        if wanted == FLOTTANT:
+            values[i] = float(values[i])
+        elif wanted is not None and (wanted != ENTIER or type(values[i]) is not int):
+            return None
+    span = instr.at(node)
+    frame = enter(ev, procedure, span)
+    for parameter, value in zip(parameters, values, strict=True):
+        frame.names[parameter.name] = value
+    frame.arguments = Operands(ev.session, instr.source, [], [])
+    return run(ev, frame, span)
 
 
 def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, procedure: Procedure,

@@ -20,6 +20,8 @@ from gibiane.values import Value, type_of
 
 EXIT_CODES = {0: 0, 1: 4, 2: 8, 3: 12}
 INTERNAL_FAILURE, INTERRUPTED = 70, 130
+# 500 nested calls of procedures take a dozen Python calls each
+RECURSION_LIMIT = 12_000
 
 
 def default_options() -> dict[str, Any]:
@@ -60,7 +62,7 @@ class Session:
         self.started = time.perf_counter()
         self._ordinals: dict[int, tuple[int, Any]] = {}
         self.evaluator = Evaluator(self)
-        self.globals = Frame(None, None)
+        self.globals = Frame(self.evaluator, None, None)
         self.globals.names.update({"VRAI": True, "FAUX": False, "D": "DROI", "C": "CERC"})
         self.evaluator.frame = self.globals
         load_operators(self)
@@ -165,6 +167,8 @@ class Session:
         previous = self.library.directory
         if source.directory is not None:
             self.library.directory = source.directory
+        limit = sys.getrecursionlimit()
+        sys.setrecursionlimit(max(limit, RECURSION_LIMIT))
         try:
             self.evaluator.run(program)
         except Stop:
@@ -181,6 +185,7 @@ class Session:
         except Exception as failure:
             self._internal(failure)
         finally:
+            sys.setrecursionlimit(limit)
             self.library.directory = previous
             self.evaluator.unwind()
             self.out.flush()
