@@ -44,8 +44,12 @@ class Evaluator:
         frame = self.frame
         loops = frame.loops
         handlers = control.HANDLERS
+        reached = pc - 1 if echo else end  # the last instruction whose lines are read
         while pc < end:
             instr = program[pc]
+            if pc > reached:
+                reached = pc
+                self._read_lines(instr)
             code = instr.code
             if code is None:
                 code = instr.code = compiled.instruction(instr) or False
@@ -58,8 +62,6 @@ class Evaluator:
                 pc = loops[-1].turn(frame)
                 continue
             self.current = instr
-            if echo and self.session.options["ECHO"] >= 1:
-                self._echo(instr)
             try:
                 if instr.bad is not None:
                     raise GibianeError(instr.bad)
@@ -94,15 +96,21 @@ class Evaluator:
         self.frame = self.session.globals
         self.frame.loops.clear()
 
-    def _echo(self, instr: Instr) -> None:
+    def _read_lines(self, instr: Instr) -> None:
+        """Pass the lines up to the end of an instruction that is reached for the first time, with their echo."""
         source, shown = self._echoed
         if source is not instr.source:
             source, shown = instr.source, 0
         last = instr.source.locate(max(instr.end - 1, instr.start))[0]
-        for number in range(shown + 1, last + 1):
-            line = instr.source.line(number)
-            self.session.write(f" $  * {line} " if line else " $  *   ")
+        if last > shown and self.session.options["ECHO"] >= 1:
+            self.echo(source, shown + 1, last)
         self._echoed = source, max(shown, last)
+
+    def echo(self, source: SourceText, first: int, last: int) -> None:
+        """Write lines of a source text as they are read."""
+        for number in range(first, last + 1):
+            line = source.line(number)
+            self.session.write(f" $  * {line} " if line else " $  *   ")
 
     # -- instructions -------------------------------------------------------------------------------------
 
