@@ -52,7 +52,7 @@ def test_bipotential_inequality(seed, mu):
 
 
 @settings(deadline=None, max_examples=60)
-@given(SEEDS, st.integers(1, 12), st.sampled_from([2, 3]), st.just(0.0) | st.floats(1e-3, 0.4), st.booleans())
+@given(SEEDS, st.integers(1, 12), st.sampled_from([2, 3]), st.floats(0, 0.4), st.booleans())
 def test_solution_obeys_every_law(seed, n, dim, mu, with_gap):
     """Solve a random well-conditioned interface: all laws hold, and equality holds in the bipotential inequality."""
     rng = np.random.default_rng(seed)

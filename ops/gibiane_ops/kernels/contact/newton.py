@@ -17,6 +17,9 @@ from gibiane_ops.kernels.errors import NotConverged
 REGULARISATION = 1e-8
 """Stiffness, relative to kref, given to free rigid motions in the Newton matrix only: the residual stays exact."""
 
+ROUND_OFF = 1e-14
+"""Residual, over the largest load, that no step improves."""
+
 SOFT_GAMMA = 1e-3
 """Second value of gamma: pairs whose slip is small and turns back and forth settle with it."""
 
@@ -242,10 +245,12 @@ def _iterate(
     E1, E2 = law.residuals(w, r)
     recent = [_merit(E1, E2)]
     best = now = _record(law, w, r, E1, E2, tolerance)
-    stalled = 0
+    stalled, polished = 0, False
     for _ in range(max_iter):
-        if best.converged:
+        # a last step after convergence costs little and leaves round-off only, even where friction is weak
+        if best.residual <= ROUND_OFF or (best.converged and polished):
             break
+        polished = best.converged
         try:
             dw, dr = law.step(w, r)
         except np.linalg.LinAlgError:

@@ -25,7 +25,7 @@ class ContactReport:
     tension : float
         Largest tensile normal force over the largest force.
     excess_friction : float
-        Largest ``abs(r_t) - mu abs(r_n)`` over the largest ``mu abs(r_n)``, or over the largest force without friction.
+        Largest ``abs(r_t) - mu abs(r_n)`` over the largest ``mu abs(r_n)``, at least a millionth of the largest force.
     adhesion_power : float
         ``sum abs(r_n (w_n - gap))`` over ``scale``: a pair that is open and loaded.
     friction_power : float
@@ -144,12 +144,13 @@ def check_state(
     power = np.einsum("ni,ni->n", r[:, 1:], slip)
     limited = np.isfinite(bound)
     equilibrium = (interface.S @ w.ravel() - interface.f).reshape(w.shape) - r
+    # without compression, or nearly without friction, the bound itself is round-off
+    friction = max(float(finite.max(initial=0)), 1e-6 * force)
     holds = interface.active[:, 0]
     report = ContactReport(
         penetration=float((-opening[holds]).max(initial=0)) / length,
         tension=float(r[:, 0].max(initial=0)) / force,
-        excess_friction=float((norms(r[:, 1:]) - bound)[limited].max(initial=0))
-        / (float(finite.max(initial=0)) or force),
+        excess_friction=float((norms(r[:, 1:]) - bound)[limited].max(initial=0)) / friction,
         adhesion_power=float(np.abs(r[holds, 0] * opening[holds]).sum()) / (force * length),
         friction_power=float((finite * norms(slip) + power)[limited].sum()) / (force * length),
         balance=float(np.abs(equilibrium).max(initial=0)) / force,
