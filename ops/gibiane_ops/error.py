@@ -1,0 +1,280 @@
+"""ERREUR as an operator: difference of fields, error of a stress, error of a contact solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gibiane.binding import Operands
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, Refused, extend
+from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, Table, type_of
+from gibiane_ops.kernels.estimate.combine import RelativeError, combine, facets_to_cells
+from gibiane_ops.kernels.estimate.contact import contact_error
+from gibiane_ops.kernels.estimate.zz import SolidError, solid_error
+from gibiane_ops.values.algebra import SCAL, SCALAIRE, added, values_of
+from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
+from gibiane_ops.values.contact import SolvedContact, solved_contacts
+from gibiane_ops.values.failures import worded
+from gibiane_ops.values.maillage import Block, Maillage
+from gibiane_ops.values.material import MATERIAL, STRESS, elastic_compliance, told_apart
+from gibiane_ops.values.modele import Modele, ModelZone
+from gibiane_ops.values.nodes import FloatArray, node_store
+from gibiane_ops.values.results import wanted_results
+from gibiane_ops.values.smoothed import METHODS, Solid, smoothed
+
+ERRE = extend("ERREUR")
+HOW = Key((*METHODS, "RESI", "RDC"), "smoothing of the stresses (as LISSER)", name="method")
+NORM = Key(("USUEL", "THESE"), "relative to the energy plus the error (default), or as in the thesis", name="norm")
+TABL = Key("TABLE", "all results in one TABLE", name="tabl")
+
+
+@ERRE.form(Arg("a", CHPOINT, "field"), Arg("b", CHPOINT, "field"), gives=[FLOTTANT])
+def _difference(ctx: Context, a: ChPoint, b: ChPoint) -> float:
+    values = values_of(added(a, b, -1.0))
+    return float(np.abs(values).max(initial=0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Zones of the model with their errors, in one order."""
+
+    zones: list[ModelZone]
+    errors: list[SolidError]
+
+
+def _solid_part(
+    ctx: Context, model: Modele, stress: MChaml, material: MChaml, method: str, smooth: MChaml | None
+) -> _Parts:
+    if method in ("RESI", "RDC"):
+        ctx.fail(
+            251,
+            "the estimate '{method}' is not available yet",
+            at="method",
+            method=method,
+            hint="SPR, MOYE, MOYC and PROJ are",
+        )
+    solids: list[Solid] = smoothed(ctx, model, stress, method, smooth)
+    zones, errors = [], []
+    for solid in solids:
+        for zone, block in zip(solid.zones, solid.blocks, strict=True):
+            compliance = elastic_compliance(ctx, material, zone, "mat")
+            with worded(ctx, at="model"):
+                errors.append(solid_error(solid.points, block, solid.nodal, compliance))
+            zones.append(zone)
+    return _Parts(zones, errors)
+
+
+def _stresses(ctx: Context, sig: MChaml, mat: MChaml, smooth: MChaml | None) -> tuple[MChaml, MChaml, MChaml | None]:
+    """Tell the stress, the material and the smoothed stress (the one at the nodes) apart."""
+    given = [("sig", sig), ("mat", mat), ("smooth", smooth)]
+    if smooth is None:
+        stress, material = told_apart(ctx, given, STRESS, MATERIAL)
+        return stress, material, None
+    stress, other, material = told_apart(ctx, given, STRESS, STRESS, MATERIAL)
+    return (other, material, stress) if stress.support == "NOEUD" else (stress, material, other)
+
+
+def _map(zones: list[ModelZone], values: list[FloatArray]) -> MChaml:
+    """Return one value per element as an element field."""
+    return MChaml(
+        [ChamZone(z, [SCAL], v[:, None, None]) for z, v in zip(zones, values, strict=True)], SCALAIRE, "GRAVITE"
+    )
+
+
+@ERRE.form(
+    Arg("model", MMODEL, "model"),
+    Arg("sig", MCHAML, "stress"),
+    Arg("mat", MCHAML, "material"),
+    Arg("smooth", MCHAML, "smoothed stress (LISSER); made here if absent", optional=True),
+    HOW,
+    Key(("ABSOLU", "RELATIF", "LOCAL"), "what the map holds", name="kind"),
+    NORM,
+    TABL,
+    gives=[FLOTTANT, MCHAML, "(FLOTTANT)"],
+)
+def _indicator(
+    ctx: Context,
+    model: Modele,
+    sig: MChaml,
+    mat: MChaml,
+    smooth: MChaml | None,
+    method: str | None,
+    kind: str | None,
+    norm: str | None,
+    tabl: bool,
+) -> Any:
+    stress, material, smooth = _stresses(ctx, sig, mat, smooth)
+    classical = method is None and smooth is None and kind is None and norm is None and not tabl
+    parts = _solid_part(ctx, model, stress, material, method or ("MOYE" if classical else "SPR"), smooth)
+    errors = parts.errors
+    found = combine(errors, norm="THES" if norm == "THESE" else "USUE")
+    shares = [e.error / np.maximum(e.error + e.energy, np.finfo(float).tiny) for e in errors]
+    if classical:
+        return found.total, _map(parts.zones, shares)
+    if kind == "ABSOLU":
+        chosen = [np.sqrt(e.error) for e in errors]
+    else:
+        chosen = [np.sqrt(share) for share in shares] if kind == "LOCAL" else found.solid_map
+    field = _map(parts.zones, chosen)
+    if tabl:
+        return _table(found, parts, field, norm)
+    return (found.total, field, found.absolute) if wanted_results(ctx) > 2 else (found.total, field)
+
+
+def _table(found: RelativeError, parts: _Parts, field: MChaml, norm: str | None) -> Table:
+    table = Table()
+    for index, value in {
+        "GLOBALE": found.total,
+        "SOLIDE": found.solid,
+        "CONTACT": found.contact,
+        "ABSOLUE": found.absolute,
+        "ENERGIE": found.energy,
+        "NBEL": sum(z.mesh.n_cells for z in parts.zones),
+        "NORME": (norm or "USUEL")[:4],
+        "CARTE": field,
+        "GARANTI": False,
+        "RAISON": "a smoothed stress estimates the error; only an equilibrated stress bounds it",
+    }.items():
+        table.set(index, value)
+    return table
+
+
+@ERRE.form(
+    Key("CONTACT", "with the contact part", required=True),
+    Arg("model", MMODEL, "solids"),
+    Arg("sig", MCHAML, "stress"),
+    Arg("mat", MCHAML, "material"),
+    Arg("mc", MMODEL, "contact model", optional=True),
+    Arg("matc", MCHAML, "contact material"),
+    Arg("u", CHPOINT, "displacement"),
+    Arg("rea", CHPOINT, "contact forces (REAC)"),
+    Arg("smooth", MCHAML, "smoothed stress (LISSER); made here if absent", optional=True),
+    HOW,
+    NORM,
+    Key(
+        ("DENSITE", "NODE", "DLUM"), "contact part: densities (default), nodal forces, lumped densities", name="variant"
+    ),
+    TABL,
+    gives=[FLOTTANT, FLOTTANT, FLOTTANT, MCHAML],
+)
+def _with_contact(
+    ctx: Context,
+    contact: bool,
+    model: Modele,
+    sig: MChaml,
+    mat: MChaml,
+    mc: Modele | None,
+    matc: MChaml,
+    u: ChPoint,
+    rea: ChPoint,
+    smooth: MChaml | None,
+    method: str | None,
+    norm: str | None,
+    variant: str | None,
+    tabl: bool,
+) -> Any:
+    if mc is None:
+        mc = model
+    elif model.contacts and not model.zones:
+        model, mc = mc, model
+    if not any(n in u.names for n in ("UX", "UY", "UZ")) and any(n in rea.names for n in ("UX", "UY", "UZ")):
+        u, rea = rea, u
+    fields = [("sig", sig), ("mat", mat), ("matc", matc), ("smooth", smooth)]
+    of_contact = next(
+        (
+            pair
+            for pair in fields
+            if pair[1] is not None and mc.contacts and pair[1].zone_of(mc.contacts[0]) is not None
+        ),
+        None,
+    )
+    if of_contact is None:
+        ctx.fail(
+            565,
+            "no material of the contact model among the operands",
+            at="matc",
+            hint="MATE MC 'MU' 0.2 makes it, with the same contact model",
+        )
+    rest: list[Any] = [field for pair in fields if pair is not of_contact and (field := pair[1]) is not None]
+    if len(rest) < 2:
+        raise ctx.operands.missing(MCHAML, "the stress and the material of the solids")
+    stress, material, smooth = _stresses(ctx, rest[0], rest[1], rest[2] if len(rest) > 2 else None)
+    parts = _solid_part(ctx, model, stress, material, method or "SPR", smooth)
+    blocks = [(z.shape, z.cells) for z in parts.zones]
+    totals = [np.zeros(len(cells)) for _, cells in blocks]
+    facets: list[ChamZone] = []
+    for state in solved_contacts(ctx, mc, of_contact[1], u, rea):
+        found, on_facets = _contact_part(ctx, state, (variant or "DENSITE")[:4], parts.zones[0].mode)
+        facets += on_facets
+        partner = np.full(node_store(ctx).count, -1, np.int64)
+        partner[state.pairs.pairs[:, 0]] = state.pairs.pairs[:, 1]
+        shared = facets_to_cells(blocks, state.zone.slave.kernel_blocks, found, partner)
+        totals = [a + b for a, b in zip(totals, shared, strict=True)]
+    result = combine(parts.errors, totals, "THES" if norm == "THESE" else "USUE")
+    columns = zip(result.solid_map, result.contact_map, result.total_map, strict=True)
+    zones = [
+        ChamZone(zone, ("SOLI", "CONT", "TOTA"), np.stack(column, axis=1)[:, None, :])
+        for zone, column in zip(parts.zones, columns, strict=True)
+    ]
+    field = MChaml(zones, SCALAIRE, "GRAVITE")
+    if tabl:
+        table = _table(result, parts, field, norm)
+        table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE"))
+        return table
+    return result.solid, result.contact, result.total, field
+
+
+def _contact_part(
+    ctx: Context, state: SolvedContact, variant: str, mode: str
+) -> tuple[list[FloatArray], list[ChamZone]]:
+    """Return the squared contact errors of the slave facets of a zone, and their roots as zones of a field."""
+    store = node_store(ctx)
+    points = store.coords[:, : state.frames.shape[1]]
+    slave = state.zone.slave
+    with worded(ctx, at="mc"):
+        found = contact_error(
+            points,
+            slave.kernel_blocks,
+            state.pairs.pairs[:, 0],
+            state.frames,
+            state.force,
+            state.relative,
+            state.gap,
+            state.mu,
+            variant,
+        )
+    zones = []
+    for block, values in zip(slave.blocks, found.facet, strict=True):
+        surface = Maillage(store, [Block(block.shape, block.cells, block.colours)])
+        zones.append(
+            ChamZone(ModelZone(surface, "CONTACT", (state.zone.law,), mode), [SCAL], np.sqrt(values)[:, None, None])
+        )
+    return found.facet, zones
+
+
+@ERRE.stream(syntax="'CONTACT'|... needs a model, a stress and a material")
+def _incomplete(ctx: Context, q: Operands) -> Any:
+    """Say what the indicator misses, rather than take its keyword for a text to show."""
+    present = [type_of(v) for v in q.values]
+    if not {MMODEL, MCHAML} & set(present):
+        return Refused
+    contact = any(isinstance(v, str) and v[:4] == "CONT" for v in q.values)
+    wanted = {MMODEL: 1, MCHAML: 3 if contact else 2, CHPOINT: 2 if contact else 0}
+    missing = next((kind for kind, n in wanted.items() if present.count(kind) < n), None)
+    what = "stress SIG, material MAT" + (", contact material MATC" if contact else "")
+    names = {
+        MMODEL: "the model MODL",
+        MCHAML: f"one of its element fields ({what})",
+        CHPOINT: "the displacement U or the contact forces REA",
+    }
+    if missing is None:
+        ctx.fail(7, "a keyword is not understood; INFO ERREUR lists them")
+    ctx.fail(
+        37,
+        "the indicator lacks {what}",
+        what=names[missing],
+        hint="X CH = ERREUR MODL SIG MAT ; XS XC XG CARTE = ERREUR 'CONTACT' MODL SIG MAT MC MATC U REA",
+    )

@@ -1,0 +1,118 @@
+"""Smoothed stresses of the solids of a model: what LISSER returns and ERREUR compares with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gibiane.registry import Context
+from gibiane_ops.kernels import recovery
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.errors import NotConverged
+from gibiane_ops.kernels.recovery import StressBlock
+from gibiane_ops.kernels.supports import moved
+from gibiane_ops.values.champs import MChaml
+from gibiane_ops.values.material import on_zone, solid_zones
+from gibiane_ops.values.modele import Modele, ModelZone
+from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+
+METHODS = ("SPR", "MOYE", "MOYC", "PROJ")
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """Zones that are smoothed together.
+
+    Attributes
+    ----------
+    zones : list of ModelZone
+    points : (k, dim) float64, length
+        The nodes of these zones.
+    nodes : (k,) int64
+        Their ids in the session, sorted.
+    blocks : list of StressBlock
+        One per zone, nodes numbered in `points`, stresses at the stress points.
+    nodal : (k, c) float64
+        Smoothed stress.
+    """
+
+    zones: list[ModelZone]
+    points: FloatArray
+    nodes: IntArray
+    blocks: list[StressBlock]
+    nodal: FloatArray
+
+
+def solids_of(zones: list[ModelZone]) -> list[list[ModelZone]]:
+    """Group zones into solids: each is one, but zones of different elements that share nodes belong together.
+
+    MODE makes one zone per type of element of a mesh; two zones of one type come from two calls, hence two solids.
+    """
+    groups: list[list[ModelZone]] = []
+    for zone in zones:
+        home = next(
+            (
+                g
+                for g in groups
+                if zone.shape not in [z.shape for z in g] and any(len(np.intersect1d(zone.cells, z.cells)) for z in g)
+            ),
+            None,
+        )
+        if home is None:
+            groups.append([zone])
+        else:
+            home.append(zone)
+    return groups
+
+
+def smoothed(ctx: Context, model: Modele, stress: MChaml, method: str, given: MChaml | None = None) -> list[Solid]:
+    """Smooth the stresses of every solid of a model, or take them from a field at the nodes that is `given`.
+
+    Patches that had to fall back on the mean are told in a warning.
+    """
+    store = node_store(ctx)
+    solids = []
+    fallbacks = 0
+    for zones in solids_of(solid_zones(ctx, model)):
+        nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
+        points = store.coords[nodes][:, : zones[0].dim]
+        blocks = []
+        for zone in zones:
+            of = shape(zone.shape)
+            values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
+            blocks.append(StressBlock(of, np.searchsorted(nodes, zone.cells), values))
+        if given is None:
+            try:
+                found = recovery.recover(points, blocks, method)
+            except NotConverged as failure:
+                ctx.fail(
+                    997,
+                    "the projection does not converge: residual {residual} after {count} iterations",
+                    residual=f"{failure.history[-1]:.3g}",
+                    count=len(failure.history),
+                )
+            nodal = found.nodal
+            fallbacks += found.fallbacks
+        else:
+            nodal = _given(ctx, given, zones, nodes, blocks)
+        solids.append(Solid(zones, points, nodes, blocks, nodal))
+    if fallbacks:
+        ctx.warn(
+            "G411",
+            "{count} patches have too few elements: their nodes take the mean of the elements around them",
+            count=fallbacks,
+            hint="a finer mesh, or LISSER 'MOYE'",
+        )
+    return solids
+
+
+def _given(
+    ctx: Context, field: MChaml, zones: list[ModelZone], nodes: IntArray, blocks: list[StressBlock]
+) -> FloatArray:
+    """Return the nodal values of a smoothed field given by the user (values of one node agree, or are averaged)."""
+    values = [
+        moved(block.shape, on_zone(ctx, field, zone, "smooth").values, field.support, "NOEUD")
+        for zone, block in zip(zones, blocks, strict=True)
+    ]
+    return recovery.nodal_mean(len(nodes), [b.cells for b in blocks], values)
