@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -97,16 +97,19 @@ def _check_sense(ctx: Context, system: System) -> None:
             )
 
 
-def _kept(ctx: Context, kind: str, k: Rigidite, make: Any) -> Any:
-    """Return what `make` computes for these parts, from the last few computed if it is there."""
-    cache: OrderedDict[Any, Any] = ctx.state.setdefault("factors", OrderedDict())
-    key = (kind, node_store(ctx).version, *(id(part) for part in k.parts))
-    if key not in cache:
-        cache[key] = k.parts, make()  # the parts stay alive with their entry, so that ids are not used again
-        while len(cache) > 3:
-            cache.popitem(last=False)
-    cache.move_to_end(key)
-    return cache[key][1]
+def _kept(ctx: Context, kind: str, k: Rigidite, extra: Any, make: Any) -> Any:
+    """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
+
+    One result of each kind is kept: a factor of a large model fills most of the memory.
+    """
+    cache: dict[str, Any] = ctx.state.setdefault("factors", {})
+    parts = [*k.matrices, *k.conditions]
+    key = (node_store(ctx).version, extra, *(id(part) for part in parts))
+    found = cache.get(kind)
+    if found is None or found[0] != key:
+        cache.clear()
+        found = cache[kind] = key, parts, make()  # the parts stay alive, so that their ids are not used again
+    return found[2]
 
 
 def _linear(ctx: Context, k: Rigidite, system: System, loads: list[tuple[FloatArray, FloatArray]]) -> list[ChPoint]:
@@ -128,7 +131,7 @@ def _linear(ctx: Context, k: Rigidite, system: System, loads: list[tuple[FloatAr
                 hint="is every solid held, and every element sound?",
             )
 
-    solver: Factor = _kept(ctx, "factor", k, factor)
+    solver: Factor = _kept(ctx, "factor", k, None, factor)
     v = solver.solve(reduction.load(system.K, F))
     _notes(ctx, solver)
     u = reduction.expand(v)
@@ -198,7 +201,9 @@ def _contact(
             ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
 
     with worded(ctx, at="k"):
-        condensation: Condensation = _kept(ctx, "contact", k, condensed)
+        condensation: Condensation = _kept(
+            ctx, "contact", k, (pairs.pairs.tobytes(), pairs.normals.tobytes()), condensed
+        )
         interface = _with_gap(condensation, pairs.gap).interface(F, reduction.offset)
     _notes(ctx, condensation.factor)
     options = {} if tolerance is None else {"tolerance": tolerance}
@@ -227,8 +232,6 @@ def _contact(
 
 
 def _with_gap(condensation: Condensation, gap: FloatArray) -> Condensation:
-    from dataclasses import replace
-
     return replace(condensation, contact=replace(condensation.contact, gap=gap))
 
 
