@@ -1,0 +1,1 @@
+"""Making meshes without a mesher: subdivision, transfinite patches, sweeps, transformations, conversions, searches."""

@@ -1,0 +1,157 @@
+"""Distances of points to simple surfaces and lines, and nodes that are close to one another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.mesh.arcs import distance_to_axis
+from gibiane_ops.kernels.mesh.transforms import direction, normal_of
+
+
+def to_line(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the distances to the line through two points; all arrays (., 3), length."""
+    return distance_to_axis(points, a, b)
+
+
+def to_plane(points: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """Return the distances to the plane through three points; all arrays (., 3), length."""
+    return np.asarray(np.abs((points - a) @ normal_of(a, b, c)), np.float64)
+
+
+def to_sphere(points: FloatArray, centre: FloatArray, on: FloatArray) -> FloatArray:
+    """Return the distances to the sphere of given centre through a point; all arrays (., 3), length."""
+    return np.asarray(np.abs(np.linalg.norm(points - centre, axis=1) - np.linalg.norm(on - centre)), np.float64)
+
+
+def to_cylinder(points: FloatArray, a: FloatArray, b: FloatArray, on: FloatArray) -> FloatArray:
+    """Return the distances to the cylinder of axis a-b through a point; all arrays (., 3), length."""
+    return np.asarray(np.abs(distance_to_axis(points, a, b) - distance_to_axis(on[None], a, b)[0]), np.float64)
+
+
+def to_cone(points: FloatArray, apex: FloatArray, b: FloatArray, on: FloatArray) -> FloatArray:
+    """Return the distances to the cone of given apex and axis through a point.
+
+    Parameters
+    ----------
+    points : (k, 3) float64, length
+    apex, b, on : (3,) float64, length
+        The apex, a second point of the axis, a point of the cone.
+
+    Returns
+    -------
+    (k,) float64, length
+        To the whole cone, both nappes.
+
+    Raises
+    ------
+    BadValue
+        The apex and b coincide, or the apex and the point of the cone.
+    """
+    u = direction(apex, b)
+    side = direction(apex, on, "side of the cone")
+    cosine = abs(float(side @ u))
+    sine = float(np.sqrt(max(0.0, 1.0 - cosine * cosine)))
+    along = np.abs((points - apex) @ u)
+    away = distance_to_axis(points, apex, b)
+    inside = along * cosine + away * sine
+    # Behind the apex, the apex itself is the nearest point of the cone.
+    return np.asarray(np.where(inside < 0, np.hypot(along, away), np.abs(away * cosine - along * sine)), np.float64)
+
+
+def to_torus(points: FloatArray, centre: FloatArray, b: FloatArray, small: FloatArray, on: FloatArray) -> FloatArray:
+    """Return the distances to a torus.
+
+    Parameters
+    ----------
+    points : (k, 3) float64, length
+    centre, b : (3,) float64, length
+        Centre and second point of the axis.
+    small, on : (3,) float64, length
+        Centre of a small circle, and a point of the torus.
+
+    Returns
+    -------
+    (k,) float64, length
+    """
+    u = direction(centre, b)
+    large = float(distance_to_axis(small[None], centre, b)[0])
+
+    def from_ring(x: FloatArray) -> FloatArray:
+        return np.asarray(np.hypot((x - centre) @ u, distance_to_axis(x, centre, b) - large), np.float64)
+
+    return np.asarray(np.abs(from_ring(points) - from_ring(on[None])[0]), np.float64)
+
+
+def nearest(points: FloatArray, target: FloatArray) -> int:
+    """Return the row of the point nearest to a target; the first among equals.
+
+    Parameters
+    ----------
+    points : (k, 3) float64, length
+    target : (3,) float64, length
+
+    Returns
+    -------
+    int
+    """
+    return int(np.linalg.norm(points - target, axis=1).argmin())
+
+
+def close_pairs(points: FloatArray, tolerance: float) -> IntArray:
+    """Find the points of one set that are close to one another.
+
+    Parameters
+    ----------
+    points : (k, 3) float64, length
+    tolerance : float, length
+
+    Returns
+    -------
+    (p, 2) int64
+        Pairs of rows, the smaller first, sorted.
+
+    Raises
+    ------
+    BadValue
+        The tolerance is negative.
+    """
+    from scipy.spatial import cKDTree
+
+    if tolerance < 0:
+        raise BadValue("distance", tolerance, "distance >= 0")
+    if len(points) < 2:
+        return np.zeros((0, 2), np.int64)
+    pairs = np.asarray(cKDTree(points).query_pairs(tolerance, output_type="ndarray"), np.int64).reshape(-1, 2)
+    return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def facing_pairs(first: FloatArray, second: FloatArray, tolerance: float) -> IntArray:
+    """Find for each point of a second set the nearest of a first one, if it is close.
+
+    Parameters
+    ----------
+    first : (k, 3) float64, length
+    second : (m, 3) float64, length
+    tolerance : float, length
+
+    Returns
+    -------
+    (p, 2) int64
+        Row in `first`, row in `second`.
+
+    Raises
+    ------
+    BadValue
+        The tolerance is negative.
+    """
+    from scipy.spatial import cKDTree
+
+    if tolerance < 0:
+        raise BadValue("distance", tolerance, "distance >= 0")
+    if len(first) == 0 or len(second) == 0:
+        return np.zeros((0, 2), np.int64)
+    distance, row = cKDTree(first).query(second)
+    kept = np.flatnonzero(distance <= tolerance)
+    return np.stack([row[kept], kept], axis=1).astype(np.int64)

@@ -1,0 +1,166 @@
+"""Which elements hold a point, and which points are inside a contour or a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.topology import Block
+
+BoolArray = NDArray[np.bool_]
+# Steps of Newton's method for the reference coordinates; bilinear maps of sound elements need four or five.
+STEPS = 12
+
+
+def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray:
+    """Find the reference coordinates of one point in each of several elements.
+
+    Parameters
+    ----------
+    name : str
+        Shape.
+    X : (m, n_nodes, space_dim) float64, length
+        Corners of the elements.
+    x : (m, space_dim) float64, length
+        A point per element.
+
+    Returns
+    -------
+    (m, dim) float64
+        By Newton's method (least squares for lines and surfaces in a larger space); far outside an element they mean
+        no more than "outside".
+    """
+    kind = shape(name)
+    centre = kind.ref_nodes[: kind.n_corners].mean(axis=0)
+    xi = np.repeat(centre[None], len(X), axis=0)
+    for _ in range(STEPS):
+        gap = x - np.einsum("mn,mni->mi", kind.N(xi), X)
+        jacobian = np.einsum("mnd,mni->mid", kind.dN(xi), X)
+        gram = np.einsum("mid,mie->mde", jacobian, jacobian)
+        # A flat element has no inverse: the shift keeps it solvable, its points are found outside.
+        gram += 1e-14 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(kind.dim)
+        step = np.linalg.solve(gram, np.einsum("mid,mi->md", jacobian, gap)[..., None])[..., 0]
+        xi = np.clip(xi + step, centre - 10.0, centre + 10.0)
+        if np.abs(step).max(initial=0.0) < 1e-14:
+            break
+    return np.asarray(xi, np.float64)
+
+
+def _in_reference(name: str, xi: FloatArray, tolerance: float | FloatArray) -> BoolArray:
+    """Tell which reference points are in the reference element, up to a tolerance (one, or one per point)."""
+    kind = shape(name)
+    below, beyond = kind.ref_nodes.min(axis=0) - xi, xi - kind.ref_nodes.max(axis=0)
+    inside = np.maximum(below, beyond).max(axis=1) <= tolerance
+    if name.startswith(("TRI", "TET", "TE1")):
+        inside &= xi.sum(axis=1) <= 1 + tolerance
+    elif name.startswith(("PRI", "PR1")):
+        inside &= xi[:, :2].sum(axis=1) <= 1 + tolerance
+    elif name.startswith("PY"):
+        inside &= np.abs(xi[:, :2]).max(axis=1) <= 1 - xi[:, 2] + tolerance
+    return np.asarray(inside, np.bool_)
+
+
+def containing(name: str, X: FloatArray, x: FloatArray, tolerance: float = 1e-9) -> IntArray:
+    """Find the elements that hold a point.
+
+    Parameters
+    ----------
+    name : str
+        Shape.
+    X : (m, n_nodes, space_dim) float64, length
+    x : (space_dim,) float64, length
+    tolerance : float
+        In reference coordinates; the distance to a line or surface is measured by the size of the element.
+
+    Returns
+    -------
+    (k,) int64
+        Their rows, increasing.
+    """
+    size = np.linalg.norm(np.ptp(X, axis=1), axis=1)
+    margin = 1e-9 * size[:, None]
+    near = np.flatnonzero(((x >= X.min(axis=1) - margin) & (x <= X.max(axis=1) + margin)).all(axis=1))
+    if len(near) == 0 or shape(name).dim == 0:
+        return near.astype(np.int64)
+    xi = reference_coordinates(name, X[near], np.repeat(x[None], len(near), axis=0))
+    image = np.einsum("mn,mni->mi", shape(name).N(xi), X[near])
+    on = np.linalg.norm(image - x, axis=1) <= 1e-8 * size[near]
+    return near[_in_reference(name, xi, tolerance) & on].astype(np.int64)
+
+
+def in_polygon(points: FloatArray, polygon: FloatArray, tolerance: float = 0.0) -> BoolArray:
+    """Tell which points of the plane are inside a closed polygon.
+
+    Parameters
+    ----------
+    points : (k, 2) float64, length
+    polygon : (n + 1, 2) float64, length
+        The last point is the first.
+    tolerance : float, length
+        Points at most this far outside count as inside.
+
+    Returns
+    -------
+    (k,) bool
+        By the parity of crossings; on the boundary, inside.
+    """
+    a, b = polygon[:-1], polygon[1:]
+    inside = np.zeros(len(points), bool)
+    for start in range(0, len(points), 4096):
+        p = points[start : start + 4096, None, :]
+        above = (a[:, 1] > p[..., 1]) != (b[:, 1] > p[..., 1])
+        height = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
+        crossing = a[:, 0] + (p[..., 1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / height
+        odd = (above & (p[..., 0] < crossing)).sum(axis=1) % 2 == 1
+        along = b - a
+        t = np.clip(((p - a) * along).sum(axis=2) / np.maximum((along * along).sum(axis=1), 1e-300), 0.0, 1.0)
+        distance = np.linalg.norm(p - a - t[..., None] * along, axis=2).min(axis=1)
+        scale = 1e-12 * float(np.abs(polygon).max())
+        inside[start : start + 4096] = odd | (distance <= max(tolerance, scale))
+    return inside
+
+
+def in_mesh(points: FloatArray, coords: FloatArray, blocks: Sequence[Block], tolerance: float = 0.0) -> BoolArray:
+    """Tell which points are inside a mesh that fills the space.
+
+    Parameters
+    ----------
+    points : (k, dim) float64, length
+    coords : (n_points, dim) float64, length
+        Nodes of the mesh.
+    blocks : sequence of (str, (m, n_nodes) int64)
+    tolerance : float, length
+        Points at most about this far outside an element count as inside it.
+
+    Returns
+    -------
+    (k,) bool
+
+    Cost
+    ----
+    For each point, the elements whose circumscribed sphere about their centre holds it.
+    """
+    from scipy.spatial import cKDTree
+
+    inside = np.zeros(len(points), bool)
+    tree = cKDTree(points) if len(points) else None
+    for name, cells in blocks:
+        if tree is None:
+            break
+        X = coords[cells]
+        centre = X.mean(axis=1)
+        radius = np.linalg.norm(X - centre[:, None], axis=2).max(axis=1)
+        found = tree.query_ball_point(centre, radius * (1 + 1e-9) + tolerance)
+        count = np.array([len(each) for each in found])
+        if not count.any():
+            continue
+        row = np.repeat(np.arange(len(cells)), count)
+        point = np.concatenate([np.asarray(each, np.int64) for each in found if len(each)])
+        xi = reference_coordinates(name, X[row], points[point])
+        margin = np.maximum(1e-9, tolerance / radius[row])
+        inside[point[_in_reference(name, xi, margin)]] = True
+    return inside

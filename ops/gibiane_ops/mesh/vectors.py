@@ -1,0 +1,57 @@
+"""Vectors: arithmetic of points, scalar and vector products."""
+
+from __future__ import annotations
+
+import numpy as np
+from gibiane.forms import Arg
+from gibiane.registry import Context, extend, operator
+from gibiane.values import ENTIER, FLOTTANT, POINT
+
+from gibiane_ops.mesh.building import dimension, new_point
+from gibiane_ops.values.maillage import Point
+
+NUMBER = (ENTIER, FLOTTANT)
+
+PVEC = operator("PVECTORIEL", topic="geometry", summary="vector product of two vectors",
+                notice="Of two POINT taken as vectors, in space. In the plane, of one vector: the same turned by 90 degrees.",
+                example="OPTI DIME 3 ; X Y Z = COOR (PVEC (1. 0. 0.) (0. 1. 0.)) ; MESS Z ;", see=["PSCAL"])
+
+
+@extend("PSCAL").form(Arg("u", POINT, "vector"), Arg("v", POINT, "vector"), gives=[FLOTTANT])
+def _psca(ctx: Context, u: Point, v: Point) -> float:
+    return float(u.coords @ v.coords)
+
+
+@PVEC.form(Arg("u", POINT, "vector"), Arg("v", POINT, "second vector, in space", optional=True), gives=[POINT])
+def _pvec(ctx: Context, u: Point, v: Point | None) -> Point:
+    if dimension(ctx) == 2 and v is None:
+        x, y, _ = u.coords
+        return new_point(ctx, np.array([-y, x, 0.0]))
+    if v is None:
+        ctx.fail(37, "no POINT for its second vector", at="u")
+    return new_point(ctx, np.cross(u.coords, v.coords))
+
+
+A, B = Arg("a", POINT, "point or vector"), Arg("b", POINT, "vector")
+
+
+@extend("+").form(A, B, gives=[POINT])
+def _plus(ctx: Context, a: Point, b: Point) -> Point:
+    return new_point(ctx, a.coords + b.coords)
+
+
+@extend("-").form(A, B, gives=[POINT])
+def _minus(ctx: Context, a: Point, b: Point) -> Point:
+    return new_point(ctx, a.coords - b.coords)
+
+
+@extend("*").form(Arg("x", NUMBER, "number"), A, gives=[POINT])
+def _times(ctx: Context, x: float, a: Point) -> Point:
+    return new_point(ctx, x * a.coords)
+
+
+@extend("/").form(A, Arg("x", NUMBER, "number"), gives=[POINT])
+def _over(ctx: Context, a: Point, x: float) -> Point:
+    if x == 0:
+        ctx.fail(26, "division by zero", at="x")
+    return new_point(ctx, a.coords / x)

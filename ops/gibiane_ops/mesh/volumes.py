@@ -1,0 +1,232 @@
+"""Volumes swept from surfaces or filling envelopes, and the surfaces that bound them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, operator
+from gibiane.values import ENTIER, FLOTTANT, LISTREEL, MAILLAGE, POINT
+
+from gibiane_ops.mesh.building import (
+    DIMENSION,
+    SURFACES,
+    axis_end,
+    dimension,
+    explained,
+    join,
+    line_nodes,
+    new_mesh,
+    nodes_of,
+    places_along,
+    reference,
+    reversed_mesh,
+)
+from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.mesh import arcs, orientation, sweep, transforms
+from gibiane_ops.values.listes import ListReel
+from gibiane_ops.values.maillage import Maillage, Point
+
+VOLU = operator("VOLUME", topic="mesh", summary="volume swept by a surface, or inside an envelope",
+                notice="`V = S VOLU N 'TRAN' VEC` sweeps a surface along a vector in N layers, `S VOLU N 'ROTA' angle P1 P2` "
+                       "turns it about an axis (degrees), `S VOLU N 'GENE' L` moves it along a line, and `S1 VOLU N S2` "
+                       "joins two surfaces that are meshed alike. Quadrangles give CUB8, triangles PRI6. Without N or "
+                       "with N negative, densities (or 'DINI' and 'DFIN') give the layers, as in DROIT; 'PROG' with a "
+                       "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
+                       "volume in place of S is prolonged from its face 2. `V = ENV VOLU` alone fills a closed envelope "
+                       "of triangles with tetrahedra.",
+                example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+                        "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL V) ;",
+                see=["FACE", "ENVELOPPE", "TRANSLATION", "MAILLER"])
+
+BASE = Arg("s", MAILLAGE, "surface, or volume to prolong from its face 2")
+COUNT = Arg("n", ENTIER, "number of layers", optional=True)
+DINI = Key("DINI", "size of the first layer", Arg("d", FLOTTANT))
+DFIN = Key("DFIN", "size of the last layer", Arg("d", FLOTTANT))
+PROG = Key("PROG", "places of the layers", Arg("places", LISTREEL))
+
+
+def _base(ctx: Context, mesh: Maillage, at: str, face: str) -> tuple[Maillage, Maillage | None]:
+    """Return the surface to sweep, and the volume that it prolongs if one was given."""
+    if dimension(ctx) != 3:
+        ctx.fail(34, "volumes exist in three dimensions only", hint="OPTI DIME 3 ELEM CUB8 ;")
+    if mesh.shapes and all(name in SURFACES for name in mesh.shapes):
+        return mesh, None
+    if not any(DIMENSION[name] == 3 for name in mesh.shapes):
+        ctx.fail(16, "a surface is wanted, this mesh holds {shapes}", at=at, shapes=" ".join(mesh.shapes) or "no element",
+                 label="holds {shapes}")
+    if face not in mesh.sides:
+        ctx.fail(24, "this volume has no recorded face {number} to prolong", at=at, number=face)
+    return mesh.sides[face], mesh
+
+
+def _places(ctx: Context, length: float, sizes: tuple[float, float], n: int | None, prog: ListReel | None) -> FloatArray:
+    if prog is None:
+        return places_along(ctx, length, *sizes, n)
+    values = prog.values
+    if len(values) < 2 or values[0] == values[-1]:
+        ctx.fail(26, "'PROG' wants at least two different places", at="prog")
+    return np.asarray((values - values[0]) / (values[-1] - values[0]), np.float64)
+
+
+def _sizes(ctx: Context, nodes: IntArray, dini: float | None, dfin: float | None,
+           far: float | None = None) -> tuple[float, float]:
+    near = float(nodes_of(ctx).density[nodes].mean())
+    return (near if dini is None else dini), ((near if far is None else far) if dfin is None else dfin)
+
+
+def _sweep(ctx: Context, surface: Maillage, place: Callable[[float], FloatArray], places: FloatArray,
+           sizes: tuple[float, float], extended: Maillage | None, end: IntArray | None = None,
+           after: Maillage | None = None) -> Maillage:
+    """Make the volume between the images of a surface; `end` gives the nodes of the last image if they exist."""
+    store, base = nodes_of(ctx), surface.nodes
+    inner = places[1:] if end is None else places[1:-1]
+    layers = [base[None]]
+    if len(inner):
+        images = np.concatenate([place(float(t)) for t in inner])
+        density = np.repeat(sizes[0] + inner * (sizes[1] - sizes[0]), len(base))
+        layers.append(store.add(images, density).reshape(-1, len(base)))
+    if end is not None:
+        layers.append(end[None])
+    ids = np.concatenate(layers)
+    blocks, bottom, top = [], [], []
+    for block in surface.blocks:
+        local = np.searchsorted(base, block.cells)
+        name, cells = sweep.sweep_cells(block.shape, local, ids)
+        with explained(ctx, "s"):
+            volume = geometry.measures(shape(name), store.coords[cells])
+        cells = np.where((volume < 0)[:, None], orientation.reversed_cells(name, cells), cells)
+        # Seen from its own side, the base turns against the sweep where the element had to be turned over.
+        turned, first = volume < 0, len(block.cells)
+        bottom.append((block.shape, _outward(block.shape, block.cells, ~turned[:first])))
+        top.append((block.shape, _outward(block.shape, ids[-1][local], turned[-first:])))
+        with explained(ctx, "s"):
+            geometry.check_cells(shape(name), store.coords[cells])
+        blocks.append((name, cells))
+    around = _around(blocks, ids)
+    faces = {"1": new_mesh(ctx, bottom), "2": new_mesh(ctx, top), "3": new_mesh(ctx, around)}
+    volume_mesh = new_mesh(ctx, blocks, faces)
+    parts = [part for part in (extended, volume_mesh, after) if part is not None]
+    if len(parts) == 1:
+        return volume_mesh
+    lateral = join([part.sides["3"] for part in parts if "3" in part.sides])
+    return join(parts, {"1": parts[0].sides["1"], "2": parts[-1].sides["2"], "3": lateral})
+
+
+def _outward(name: str, cells: IntArray, turn: Any) -> IntArray:
+    return np.where(turn[:, None], orientation.reversed_cells(name, cells), cells)
+
+
+def _around(blocks: list[tuple[str, IntArray]], ids: IntArray) -> list[tuple[str, IntArray]]:
+    """Return the boundary facets that stand between two layers."""
+    found = topology.boundary(blocks).get("QUA4")
+    if found is None:
+        return []
+    layer = np.zeros(int(ids.max()) + 1, np.int64)
+    layer[ids.ravel()] = np.repeat(np.arange(len(ids)), ids.shape[1])
+    at = layer[found.nodes]
+    return [("QUA4", found.nodes[at.min(axis=1) != at.max(axis=1)])]
+
+
+@VOLU.form(BASE, COUNT, DINI, DFIN, PROG, Key("TRAN", "translate", Arg("v", POINT, "vector"), required=True),
+           gives=[MAILLAGE])
+def _translated(ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None,
+                tran: Point) -> Maillage:
+    surface, extended = _base(ctx, s, "s", "2")
+    vector, nodes = tran.coords, surface.nodes
+    sizes = _sizes(ctx, nodes, dini, dfin, float(tran.store.density[tran.node]) or None)
+    places = _places(ctx, float(np.linalg.norm(vector)), sizes, n, prog)
+    x = nodes_of(ctx).coords[nodes]
+    return _sweep(ctx, surface, lambda t: x + t * vector, places, sizes, extended)
+
+
+@VOLU.form(BASE, COUNT, DINI, DFIN, PROG, Key("ROTA", "turn", Arg("angle", FLOTTANT, "degrees"), Arg("a", POINT, "axis"),
+                                              Arg("b", POINT, "axis"), required=True), gives=[MAILLAGE])
+def _rotated(ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None,
+             rota: tuple[float, Point, Point]) -> Maillage:
+    surface, extended = _base(ctx, s, "s", "2")
+    angle, a, b = rota
+    axis, nodes = axis_end(ctx, a, b), surface.nodes
+    x = nodes_of(ctx).coords[nodes]
+    sizes = _sizes(ctx, nodes, dini, dfin)
+    radius = float(arcs.distance_to_axis(x, a.coords, axis).mean())
+    places = _places(ctx, abs(float(np.radians(angle))) * radius, sizes, n, prog)
+    return _sweep(ctx, surface, lambda t: transforms.rotation(angle * t, a.coords, axis)(x), places, sizes, extended)
+
+
+@VOLU.form(BASE, Key("GENE", "move along a line", Arg("line", MAILLAGE), required=True), gives=[MAILLAGE])
+def _generated(ctx: Context, s: Maillage, gene: Maillage) -> Maillage:
+    surface, extended = _base(ctx, s, "s", "2")
+    store = nodes_of(ctx)
+    line = line_nodes(ctx, gene, "gene")
+    path = store.coords[line] - store.coords[line[0]]
+    x, rank = store.coords[surface.nodes], np.arange(len(line), dtype=np.float64)
+    density = float(store.density[line].mean())
+    return _sweep(ctx, surface, lambda t: x + path[round(t)], rank, (density, density), extended)
+
+
+@VOLU.form(BASE, COUNT, DINI, DFIN, PROG, Arg("last", MAILLAGE, "second surface, meshed like the first"), gives=[MAILLAGE])
+def _ruled(ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None,
+           last: Maillage) -> Maillage:
+    first, extended = _base(ctx, s, "s", "2")
+    second, after = _base(ctx, last, "last", "1")
+    store, base = nodes_of(ctx), first.nodes
+    end = _matching(ctx, first, second, base)
+    x0, x1 = store.coords[base], store.coords[end]
+    sizes = _sizes(ctx, base, dini, dfin, float(store.density[end].mean()))
+    places = _places(ctx, float(np.linalg.norm(x1 - x0, axis=1).mean()), sizes, n, prog)
+    return _sweep(ctx, first, lambda t: (1 - t) * x0 + t * x1, places, sizes, extended, end, after)
+
+
+def _matching(ctx: Context, first: Maillage, second: Maillage, base: IntArray) -> IntArray:
+    """Return the node of the second surface that stands at each node of the first, by the order of the elements."""
+    for candidate in (second, reversed_mesh(second)):
+        if [(a.shape, a.cells.shape) for a in first.blocks] != [(b.shape, b.cells.shape) for b in candidate.blocks]:
+            break
+        one = np.searchsorted(base, np.concatenate([b.cells.ravel() for b in first.blocks]))
+        two = np.concatenate([b.cells.ravel() for b in candidate.blocks])
+        end = np.empty(len(base), np.int64)
+        end[one] = two
+        if (end[one] == two).all() and len(np.unique(end)) == len(end):
+            return end
+    ctx.fail(35, "the two surfaces are not meshed alike: {first} and {second} elements", at="last",
+             first=first.n_cells, second=second.n_cells, label="not the image of the first surface",
+             hint="make the second surface from the first, with PLUS, TOUR or DEPL")
+
+
+FACE = operator("FACE", topic="mesh", summary="faces of a swept volume",
+                notice="`S = FACE I V`: face 1 is the one that the volume was swept from, 2 the opposite one, 3 the rest of "
+                       "the boundary. Without I, all of them: `S1 S2 S3 = FACE V`. The normals of the facets leave the "
+                       "volume.",
+                example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+                        "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL (FACE 3 V)) ;",
+                see=["VOLUME", "ENVELOPPE", "COTE"])
+
+
+@FACE.form(Arg("g", MAILLAGE, "volume"), Arg("i", ENTIER, "which face", optional=True), gives=["MAILLAGE..."])
+def _face(ctx: Context, g: Maillage, i: int | None) -> Any:
+    return reference(ctx, g, i, "face")
+
+
+ENVE = operator("ENVELOPPE", topic="mesh", summary="boundary surface of a volume",
+                notice="The facets that belong to one element only, with normals that leave the volume, or enter it with "
+                       "'ORIE'. An empty envelope is an error unless 'NOID' is given.",
+                example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+                        "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL (ENVE V)) ;",
+                see=["FACE", "CONTOUR"])
+
+
+@ENVE.form(Arg("g", MAILLAGE, "volume"), Key("ORIE", "normals into the volume"), Key("NOID", "an empty result is allowed"),
+           gives=[MAILLAGE])
+def _enveloppe(ctx: Context, g: Maillage, orie: bool, noid: bool) -> Maillage:
+    solids = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 3]
+    found = topology.boundary(solids) if solids else {}
+    if not found and not noid:
+        ctx.fail(26, "this mesh has no envelope: it holds {shapes}", at="g", shapes=" ".join(g.shapes) or "no element",
+                 hint="CONT gives the boundary of a surface; 'NOID' accepts an empty result")
+    skin = new_mesh(ctx, [(name, facets.nodes) for name, facets in found.items()])
+    return reversed_mesh(skin) if orie else skin
