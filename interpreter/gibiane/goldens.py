@@ -99,7 +99,7 @@ def read(script: Path) -> Golden:
 
 def discover(folder: Path, *, all_scripts: bool = False) -> list[Path]:
     """Return the scripts under a folder that have an expected output beside them, or all, in order of name."""
-    scripts = sorted(p for p in folder.rglob("*.dgibi") if p.is_file())
+    scripts = sorted(p for p in folder.resolve().rglob("*.dgibi") if p.is_file())
     return [p for p in scripts if all_scripts or p.with_suffix(".out").is_file()]
 
 
