@@ -12,6 +12,7 @@ import io
 import os
 import re
 import shutil
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -122,7 +123,7 @@ def run(golden: Golden) -> Outcome:
 
 @contextmanager
 def _workplace(script: Path) -> Iterator[None]:
-    """Stand in a temporary folder that holds copies of the files the script may read."""
+    """Stand in a temporary folder that holds copies of the files the script may read; nobody is at the keyboard."""
     before = Path.cwd()
     text = decode(script.read_bytes())
     with tempfile.TemporaryDirectory(prefix="gibiane-") as name:
@@ -131,11 +132,13 @@ def _workplace(script: Path) -> Iterator[None]:
                 shutil.copy(path, name)
             elif path.is_dir() and (path.name == "procedur" or f"{path.name}/" in text):
                 shutil.copytree(path, Path(name, path.name))
+        keyboard, sys.stdin = sys.stdin, io.StringIO()
         os.chdir(name)
         try:
             yield
         finally:
             os.chdir(before)
+            sys.stdin = keyboard
 
 
 def normalise(text: str) -> str:

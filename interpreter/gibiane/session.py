@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-from gibiane import registry
+from gibiane import registry, slips
 from gibiane.blocks import annotate
 from gibiane.diagnostics import ERROR, Diagnostic, GibianeError, make, render
 from gibiane.evaluator import Evaluator
@@ -117,6 +117,19 @@ class Session:
             return str(value)
         return str(self.ordinal(value))
 
+    def assign(self, name: str, value: Any) -> None:
+        """Give a name a value in the current frame, for an operator that names its results itself (ACQU)."""
+        self.evaluator.assign_name(name, value, self.evaluator.current)
+
+    def ask(self, prompt: str) -> str:
+        """Ask for a line at the keyboard; return "" when none can be had."""
+        self.out.write(prompt)
+        self.out.flush()
+        line = sys.stdin.readline()
+        if not line.endswith("\n"):
+            self.out.write("\n")
+        return line.rstrip("\n")
+
     def call(self, procedure: Any, arguments: list[Any], span: Span) -> list[Any]:
         """Call a procedure (an object or its name) from an operator; return its results."""
         return self.evaluator.call_values(procedure, arguments, span)
@@ -163,6 +176,7 @@ class Session:
 
     def _run(self, source: SourceText) -> int:
         program = parse(source)
+        slips.mark(source, program)
         annotate(program)
         previous = self.library.directory
         if source.directory is not None:

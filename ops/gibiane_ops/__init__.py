@@ -44,6 +44,10 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "AFFINITE": ("gibiane_ops.mesh.transforms",),
     "DEPLACER": ("gibiane_ops.mesh.transforms",),
     # lists
+    "SORTIR": ("gibiane_ops.lists.files",),
+    "LIRE": ("gibiane_ops.lists.files",),
+    "OBTENIR": ("gibiane_ops.lists.files",),
+    "ACQUERIR": ("gibiane_ops.lists.files",),
     "IPOL": ("gibiane_ops.curves",),
     "EVOLUTION": ("gibiane_ops.curves",),
     "PROGRESSION": ("gibiane_ops.lists.building",),

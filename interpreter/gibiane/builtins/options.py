@@ -78,6 +78,11 @@ def _file(ctx: Context, q: Operands) -> Any:
     return unit if unit is not None else _word(q)
 
 
+def _acquired(ctx: Context, q: Operands) -> Any:
+    ctx.state.pop("acquired file", None)  # ACQU starts at its first line, also if it is the same file again
+    return _file(ctx, q)
+
+
 def _language(ctx: Context, q: Operands) -> str:
     return q.need_keyword(("FRAN", "ANGL"))
 
@@ -97,7 +102,7 @@ def _input(ctx: Context, q: Operands) -> Any:
 OPTIONS: dict[str, Reader] = {
     "DIME": _integer(1, 3), "MODE": _mode, "ELEM": lambda ctx, q: _word(q), "DENS": _density,
     "ECHO": _integer(-1, 2), "ERRE": _one_of("FATA", "NORM", "CONT", "IGNO"), "LANG": _language,
-    "SORT": _file, "SAUV": _file, "REST": _file, "ACQU": _file, "LECT": _file, "DONN": _input, "IMPR": _file,
+    "SORT": _file, "SAUV": _file, "REST": _file, "ACQU": _acquired, "LECT": _file, "DONN": _input, "IMPR": _file,
     "TRAC": _anything, "FTRA": _file, "EPTR": _anything, "ISOV": _anything, "COUL": _anything, "COSC": _anything,
     "OEIL": _anything, "TITR": _anything, "RESO": _anything, "NORM": _anything, "PREC": _real, "PETI": _real,
     "GRAN": _real, "ZERO": _real, "VERI": _anything, "IMPI": _anything, "DEBU": _anything, "LOCA": _anything,
