@@ -211,6 +211,7 @@ def _value(text: str) -> float:
 
 def main(folder: Path, *, accept: bool, write: Callable[[str], object]) -> int:
     """Run every golden script under a folder, tell what differs, end with a summary; return 0 or 1."""
+    folder = folder.resolve()
     failed = blessed = count = 0
     for script in discover(folder, all_scripts=accept):
         name = script.relative_to(folder).as_posix()
