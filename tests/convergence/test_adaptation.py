@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 
 from gibiane_ops.kernels import recovery
-from gibiane_ops.kernels.adapt.sizes import size_map
+from gibiane_ops.kernels.adapt.sizes import singular_orders, size_map
 from gibiane_ops.kernels.assembly import (
     assemble,
     assemble_vector,
@@ -123,7 +123,7 @@ def relative_error(points, groups):
     return combine(parts, shares, "THES"), contact.pairs
 
 
-def adapt(start, caps):
+def adapt(start, caps, orders=None):
     """Run the loop at a prescribed error of 4 %; return (number of elements, error in %) before and after each pass."""
     points, cells, groups = start
     history = []
@@ -133,7 +133,9 @@ def adapt(start, caps):
         if cap is None:
             return history
         blocks = [("TET4", groups["LOWER"]), ("TET4", groups["UPPER"])]
-        wanted = size_map(points, blocks, np.concatenate(error.total_map), 0.04, max_count=cap, pairs=pairs)
+        each = np.concatenate(error.total_map)
+        order = 1.0 if orders is None else orders(points, blocks, each)
+        wanted = size_map(points, blocks, each, 0.04, order=order, max_count=cap, pairs=pairs)
         new = remesh(points, cells, wanted.nodal, groups=groups, pairs=[("FACE2", "FACE1")])
         first, second = new.pairs[0].T
         assert np.array_equal(new.points[first], new.points[second])
@@ -159,3 +161,11 @@ def test_prescribed_error_is_approached_in_two_and_three_passes(start, slack):
     assert history[2][1] <= slack * 5.2
     assert history[3][0] <= slack * 32_000
     assert history[3][1] <= slack * 4.6
+
+
+@pytest.mark.slow
+def test_orders_by_element_ask_for_more_beside_singular_edges():
+    history = adapt(start_mesh(5, 4, 40.0), [21_000, 21_000, 32_000], singular_orders)
+    assert history[2][1] <= 5.2
+    assert history[3][0] <= 32_000
+    assert history[3][1] <= 4.5

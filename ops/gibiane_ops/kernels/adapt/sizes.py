@@ -125,29 +125,30 @@ def _floored(error2: FloatArray) -> FloatArray:
 
 
 def singular_orders(
-    n_points: int,
+    points: FloatArray,
     blocks: Sequence[Block],
-    error2: FloatArray,
-    measures: FloatArray,
-    order: float,
+    error: FloatArray,
+    order: float = 1.0,
     *,
     singular: float = SINGULAR_ORDER,
-    beta: float = 3.0,
+    beta: float | None = None,
 ) -> FloatArray:
     """Give each element its order of convergence, lower where the error peaks.
 
     Parameters
     ----------
-    n_points : int
+    points : (n_points, dim) float64, length
     blocks : list of (str, (m, n_nodes) int64)
-    error2, measures : (n_cells,) float64
-        Squared error and measure of each cell, through the blocks.
+        Cells of one dimension.
+    error : (n_cells,) float64
+        Error of each cell, through the blocks.
     order : float
         Order away from singularities.
     singular : float
         Order of the elements that touch a singular node.
-    beta : float
-        A node is singular when its error density is at least beta times the mean; 3 in 3D, 2 in a plane.
+    beta : float, optional
+        A node is singular when its error density is at least beta times that of the whole; by default 2 for plane or
+        second-order elements, 3 for linear solid ones.
 
     Returns
     -------
@@ -161,15 +162,18 @@ def singular_orders(
     ------
     Coorevits, Ladeveze and Pelle 1994.
     """
-    indptr, cells = topology.node_to_cells(blocks, n_points)
+    first = shape(blocks[0][0])
+    limit = beta if beta is not None else 3.0 if first.dim == 3 and first.degree == 1 else 2.0
+    measures = np.concatenate([geometry.measures(shape(name), points[cells]) for name, cells in blocks])
+    error2 = np.asarray(error, np.float64) ** 2
+    indptr, cells = topology.node_to_cells(blocks, len(points))
     used = np.flatnonzero(np.diff(indptr))
-    starts = indptr[used]
-    density = np.zeros(n_points)
-    density[used] = np.sqrt(np.add.reduceat(error2[cells], starts) / np.add.reduceat(measures[cells], starts))
-    mean = float(np.sqrt(error2.sum() / measures.sum()))
-    peak = density >= beta * mean
+    density2 = np.zeros(len(points))
+    density2[used] = np.add.reduceat(error2[cells], indptr[used]) / np.add.reduceat(measures[cells], indptr[used])
+    whole = float(error2.sum() / measures.sum())
+    peak = (density2 >= limit**2 * whole) & (whole > 0)
     touched = np.concatenate([peak[each].any(axis=1) for _, each in blocks])
-    return np.where(touched & (mean > 0), min(singular, order), order)
+    return np.where(touched, min(singular, order), order)
 
 
 def nodal_sizes(
