@@ -30,8 +30,8 @@ def _without_head(instr: Instr) -> list[Node]:
 def _if(ev: Evaluator, program: list[Instr], pc: int) -> int:
     instr = program[pc]
     code = instr.code
-    if code is None or code is False:
-        code = instr.code = _condition(instr)
+    if not code:
+        code = instr.code = _condition(instr, ev.closures)
     holds = code(ev.frame)
     if holds is None:
         holds = _condition_by_queue(ev, instr)
@@ -43,9 +43,9 @@ def _if(ev: Evaluator, program: list[Instr], pc: int) -> int:
                             hint="write its FINSI"))
 
 
-def _condition(instr: Instr) -> Callable[[Frame], bool | None]:
+def _condition(instr: Instr, closures: bool) -> Callable[[Frame], bool | None]:
     """Return a closure for the condition of an SI; it gives None when the queue must do the work."""
-    fetch = compiled.condition(_without_head(instr))
+    fetch = compiled.condition(_without_head(instr)) if closures else None
 
     def holds(frame: Frame) -> bool | None:
         if fetch is None:

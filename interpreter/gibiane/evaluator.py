@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gibiane import compiled, control, objects, procedures
+from gibiane import compiled, control, objects, procedures, slips
 from gibiane.binding import ABSENT, DOT, PERCENT, Mark, Operands
-from gibiane.diagnostics import FATAL, GibianeError, make, nearest
+from gibiane.diagnostics import FATAL, GibianeError, Label, Text, make, nearest
 from gibiane.frames import Frame
 from gibiane.nodes import Access, Group, Instr, Literal, Name, Node, Target
 from gibiane.registry import Operator, find, names
@@ -30,6 +30,7 @@ class Evaluator:
         self.session = session
         self.frame: Frame = Frame(self, None, None)
         self.current: Instr | None = None
+        self.closures = True  # False: the queue machine alone, which defines the language (tests compare both)
         self._echoed: tuple[SourceText | None, int] = (None, 0)
 
     # -- programs -----------------------------------------------------------------------------------------
@@ -52,7 +53,7 @@ class Evaluator:
                 self._read_lines(instr)
             code = instr.code
             if code is None:
-                code = instr.code = compiled.instruction(instr) or False
+                code = instr.code = (self.closures and compiled.instruction(instr)) or False
             head = instr.head
             if head is None:
                 if code and code(frame):
@@ -80,6 +81,8 @@ class Evaluator:
         diag = failure.diagnostic
         if diag.span is None:
             diag.span = instr.span()
+        if instr.bad is None and (lost := slips.slip(instr, slips.Habits())) is not None and lost.span is not None:
+            diag.notes.append(Text("is a ; missing at the end of line {line}?", {"line": lost.span.line}))
         for target in instr.targets:
             if not target.path:
                 self.assign_name(target.name, NOTHING, instr)
@@ -255,7 +258,7 @@ class Evaluator:
                     continue
                 break
             del q.values[i], q.nodes[i]
-            if op.symbolic and compiled.reduce_front(op.name, q.values, q.nodes, node):
+            if op.symbolic and self.closures and compiled.reduce_front(op.name, q.values, q.nodes, node):
                 continue
             try:
                 op.run(self.session, q, node)
@@ -346,17 +349,34 @@ class Evaluator:
         label = q.describe(at)
         value, node = q.values[at], q.nodes[at]
         hint, close = None, None
-        if isinstance(value, str) and isinstance(node, Name) and value == node.word:
+        unknown = self._unknown_word()
+        if isinstance(value, str) and isinstance(node, Name) and value == node.word and q.is_operator_word(at):
+            label = Label(label.span, Text("the operator {word} is not run: a word stands before it", {"word": value}))
+            hint = "words follow their operator: ET 'abc' 'def', EGA X 'WORD'"
+        elif isinstance(value, str) and isinstance(node, Name) and value == node.word:
             known = [*names(), *self.session.names(), *self.session.library.names()]
             close = nearest(value, known)
             hint = "did you mean {close}?" if close else (
                 "no operator, procedure or object has this name: is it misspelt, or defined later?")
+        elif isinstance(value, str) and isinstance(node, Name):
+            pass  # a variable that holds a word
         elif isinstance(value, str) and find(value) is not None:
             hint = "an operator that follows EXTR, TYPE, CHAI, MOT, LIST or VALE needs parentheses around these"
+        elif unknown is not None:
+            close = nearest(unknown, [*names(), *self.session.names(), *self.session.library.names()])
+            hint = "nothing is named {unknown}: did you mean {close}?" if close else (
+                "no operator, procedure or object is named {unknown}: is it misspelt, or defined later?")
         elif len(q.values) > 1 and all(type_of(v) in (ENTIER, FLOTTANT) for v in q.values):
             hint = "an operator is missing between the values, or a ; between two instructions"
         return GibianeError(make(11, "a result of type {type} is left over", type=type_of(value), labels=[label],
-                                 span=label.span, hint=hint, close=close))
+                                 span=label.span, hint=hint, close=close, unknown=unknown))
+
+    def _unknown_word(self) -> str | None:
+        """Return the first word of the current instruction if nothing has this name: a misspelt operator, perhaps."""
+        item = next((i for i in self.current.items if isinstance(i, Name)), None) if self.current else None
+        if item is None or self.frame.lookup(item.name) is not ABSENT or find(item.word) is not None:
+            return None
+        return item.word
 
     def _warn_lonely_word(self, q: Operands) -> None:
         node = q.nodes[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from gibiane import compiled
+from gibiane import slips
 from gibiane.binding import ABSENT, Operands
 from gibiane.blocks import annotate, check_structure
 from gibiane.diagnostics import GibianeError, make
@@ -82,6 +83,7 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
     if source is None:
         return None
     program = parse(source)
+    slips.mark(source, program)
     annotate(program)
     outer, ev.frame = ev.frame, ev.session.globals
     try:
@@ -135,7 +137,7 @@ def run(ev: Evaluator, frame: Frame, span: Span) -> list[Any]:
         ev.current = final
         code = final.code
         if code is None:
-            code = final.code = compiled.result(final) or False
+            code = final.code = (ev.closures and compiled.result(final)) or False
         value = code(frame) if code and not frame.quitting else None
         if value is not None:
             frame.results.append(value)
