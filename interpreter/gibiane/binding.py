@@ -308,6 +308,8 @@ def explain(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeE
     i = q.first_word()
     if operator.symbolic:
         failure = _explain_infix(operator, misses, q)
+        if failure.diagnostic.code != "196":
+            forms = []  # with one operand, or none, what every type of operands gives is of no help
     elif i >= 0 and best.keys and isinstance(q.values[i], str) and not q.is_operator_word(i):
         keys = sorted({w for m in misses for w in m.keys})
         failure = q.unknown_keyword(keys)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -45,6 +46,9 @@ G_CODES = {
 }
 
 
+_AN = re.compile(r"\ba (?=(?:ANNULE|ENTIER|EVOLUTIO|OBJET)\b)")
+
+
 @dataclass(frozen=True)
 class Text:
     """A sentence as template and fields, worded in the reader's language when shown."""
@@ -62,7 +66,8 @@ class Text:
         if not self.fields:
             return template
         shown = {k: v.render(lang) if isinstance(v, Text) else v for k, v in self.fields.items()}
-        return template.format(**shown)
+        text = template.format(**shown)
+        return _AN.sub("an ", text) if lang == "en" else text
 
 
 @dataclass(frozen=True)
