@@ -11,7 +11,7 @@ from gibiane.blocks import annotate, check_structure
 from gibiane.diagnostics import GibianeError, make
 from gibiane.frames import Frame
 from gibiane.nodes import Instr, Literal, Name, Node
-from gibiane.source import Span
+from gibiane.source import SourceText, Span
 from gibiane.syntax import parse
 from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Parameter, Procedure
 
@@ -108,26 +108,23 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
 def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:
     """Call a procedure with operands read from the caller's queue; push its results in front."""
     span = q.span(node)
-    frame = enter(ev, procedure, span)
+    frame = _enter(ev, procedure, q.source, node)
     frame.arguments = q
     for parameter in procedure.parameters:
         _read_parameter(frame.names, parameter, q, procedure, span)
-    q.push_front(run(ev, frame, span), node)
+    q.push_front(_run(ev, frame, procedure, q.source, node), node)
 
 
-def enter(ev: Evaluator, procedure: Procedure, span: Span) -> Frame:
+def _enter(ev: Evaluator, procedure: Procedure, source: SourceText, node: Node) -> Frame:
     """Return the frame of a new call, on top of the current one."""
     if ev.frame.depth >= MAX_DEPTH:
         raise GibianeError(make("G103", "calls are nested deeper than {limit}: does {name} call itself without end?",
-                                limit=MAX_DEPTH, name=procedure.name, span=span))
+                                limit=MAX_DEPTH, name=procedure.name, span=Span(source, node.start, node.end)))
     return Frame(ev, ev.frame, procedure)
 
 
-def run(ev: Evaluator, frame: Frame, span: Span) -> list[Any]:
+def _run(ev: Evaluator, frame: Frame, procedure: Procedure, source: SourceText, node: Node) -> list[Any]:
     """Run the body of the procedure of a frame whose arguments are set; return its results."""
-    procedure = frame.procedure
-    if procedure is None:
-        return []
     caller, instr = ev.frame, ev.current
     ev.frame = frame
     try:
@@ -146,7 +143,7 @@ def run(ev: Evaluator, frame: Frame, span: Span) -> list[Any]:
                 raise GibianeError(final.bad)
             frame.results.extend(results_of(ev, final, final.items, skip_undefined=frame.quitting))
     except GibianeError as failure:
-        failure.diagnostic.trace.append((procedure.name, span))
+        failure.diagnostic.trace.append((procedure.name, Span(source, node.start, node.end)))
         raise
     finally:
         ev.frame = caller
@@ -159,18 +156,17 @@ def call_with_numbers(ev: Evaluator, procedure: Procedure, values: list[Any], in
     parameters = procedure.parameters
     if len(parameters) != len(values):
         return None
-    for i, parameter in enumerate(parameters):
+    names: dict[str, Any] = {}
+    for parameter, value in zip(parameters, values, strict=True):
         wanted = parameter.type_name
         if wanted == FLOTTANT:
-            values[i] = float(values[i])
-        elif wanted is not None and (wanted != ENTIER or type(values[i]) is not int):
+            value = float(value)
+        elif wanted is not None and (wanted != ENTIER or type(value) is not int):
             return None
-    span = instr.at(node)
-    frame = enter(ev, procedure, span)
-    for parameter, value in zip(parameters, values, strict=True):
-        frame.names[parameter.name] = value
-    frame.arguments = Operands(ev.session, instr.source, [], [])
-    return run(ev, frame, span)
+        names[parameter.name] = value
+    frame = _enter(ev, procedure, instr.source, node)
+    frame.names = names
+    return _run(ev, frame, procedure, instr.source, node)
 
 
 def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, procedure: Procedure,
@@ -222,8 +218,9 @@ def _head_position(instr: Instr) -> int:
 def read_arguments(ev: Evaluator, instr: Instr, items: list[Node]) -> None:
     """Run ARGU: read more arguments from what is still unread in the caller's queue."""
     frame = ev.frame
-    if frame.procedure is None or frame.arguments is None:
+    if frame.procedure is None:
         raise GibianeError(make(153, "ARGUMENT stands inside a procedure only", operator="ARGUMENT",
                                 span=instr.span()))
+    unread = frame.arguments or Operands(ev.session, instr.source, [], [])
     for parameter in parameters(instr, items):
-        _read_parameter(frame.names, parameter, frame.arguments, frame.procedure, instr.span())
+        _read_parameter(frame.names, parameter, unread, frame.procedure, instr.span())
