@@ -129,13 +129,16 @@ def test_without_error_the_sizes_stay():
 def test_singular_nodes_lower_the_order_around_them():
     points, blocks = strip(10)
     cells = blocks[0][1]
-    error = np.where((cells < 4).any(axis=1), 1.0, 1e-3)  # the first cube carries nearly all the error
-    q = sizes.singular_orders(points, blocks, error)
-    assert (q[(cells < 4).any(axis=1)] == 0.5).all()
-    assert (q[(cells >= 12).all(axis=1)] == 1.0).all()
-    assert (sizes.singular_orders(points, blocks, error, beta=100.0) == 1.0).all()
-    assert (sizes.singular_orders(points, blocks, np.zeros(60)) == 1.0).all()
-    assert (sizes.singular_orders(points, blocks, np.ones(60)) == 1.0).all()
+    near = (cells < 4).any(axis=1)
+    error2 = np.where(near, 1.0, 1e-6)  # the first cube carries nearly all the error
+
+    def orders(error2, **more):
+        return sizes.singular_orders(len(points), blocks, error2, np.full(60, 1 / 6), 1.0, **more)
+
+    assert (orders(error2)[near] == 0.5).all()
+    assert (orders(error2)[(cells >= 12).all(axis=1)] == 1.0).all()
+    for nowhere in (orders(error2, beta=100.0), orders(np.zeros(60)), orders(np.ones(60))):
+        assert (nowhere == 1.0).all()
 
 
 @pytest.mark.parametrize(

@@ -125,30 +125,30 @@ def _floored(error2: FloatArray) -> FloatArray:
 
 
 def singular_orders(
-    points: FloatArray,
+    n_points: int,
     blocks: Sequence[Block],
-    error: FloatArray,
-    order: float = 1.0,
+    error2: FloatArray,
+    measures: FloatArray,
+    order: float,
     *,
     singular: float = SINGULAR_ORDER,
-    beta: float | None = None,
+    beta: float = 3.0,
 ) -> FloatArray:
     """Give each element its order of convergence, lower where the error peaks.
 
     Parameters
     ----------
-    points : (n_points, dim) float64, length
+    n_points : int
     blocks : list of (str, (m, n_nodes) int64)
-        Cells of one dimension.
-    error : (n_cells,) float64
-        Error of each cell, through the blocks.
+    error2, measures : (n_cells,) float64
+        Squared error and measure of each cell, through the blocks.
     order : float
         Order away from singularities.
     singular : float
         Order of the elements that touch a singular node.
-    beta : float, optional
-        A node is singular when its error density is at least beta times that of the whole; by default 2 for plane or
-        second-order elements, 3 for linear solid ones.
+    beta : float
+        A node is singular when its error density is at least beta times that of the whole; 3 for linear solid
+        elements, 2 for plane or second-order ones.
 
     Returns
     -------
@@ -162,16 +162,12 @@ def singular_orders(
     ------
     Coorevits, Ladeveze and Pelle 1994.
     """
-    first = shape(blocks[0][0])
-    limit = beta if beta is not None else 3.0 if first.dim == 3 and first.degree == 1 else 2.0
-    measures = np.concatenate([geometry.measures(shape(name), points[cells]) for name, cells in blocks])
-    error2 = np.asarray(error, np.float64) ** 2
-    indptr, cells = topology.node_to_cells(blocks, len(points))
+    indptr, cells = topology.node_to_cells(blocks, n_points)
     used = np.flatnonzero(np.diff(indptr))
-    density2 = np.zeros(len(points))
+    density2 = np.zeros(n_points)
     density2[used] = np.add.reduceat(error2[cells], indptr[used]) / np.add.reduceat(measures[cells], indptr[used])
     whole = float(error2.sum() / measures.sum())
-    peak = (density2 >= limit**2 * whole) & (whole > 0)
+    peak = (density2 >= beta**2 * whole) & (whole > 0)
     touched = np.concatenate([peak[each].any(axis=1) for _, each in blocks])
     return np.where(touched, min(singular, order), order)
 
