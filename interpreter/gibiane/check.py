@@ -2,26 +2,75 @@
 
 from __future__ import annotations
 
-from gibiane.blocks import annotate, check_structure
+from gibiane import slips
+from gibiane.blocks import annotate, block_name, check_structure
 from gibiane.diagnostics import Diagnostic, make
+from gibiane.nodes import Instr
 from gibiane.source import SourceText
 from gibiane.syntax import parse
 
 
 def problems(source: SourceText) -> list[Diagnostic]:
-    """Return the syntax errors and wrong block structures of a source text, in order of place."""
+    """Return the syntax errors and wrong block structures of a source text, in order of place.
+
+    What follows the `FIN ;` of a script is not read. Block structure is judged only when every instruction is
+    sound, for a lost `;` takes block words with it.
+    """
     program = parse(source)
+    lost = slips.apostrophe(source) if slips.ends_in_string(program) else None
+    read = _until_end(program)
+    if lost is None or read[-1].end <= lost:
+        program = read
+    slips.mark(source, program, thorough=True)
     annotate(program)
     found = [instr.bad for instr in program if instr.bad is not None]
-    index = 0
+    if not found:
+        found = _structure(program)
+    return sorted(found, key=lambda d: d.span.start if d.span else 0)
+
+
+def _until_end(program: list[Instr]) -> list[Instr]:
+    """Return the instructions up to the FIN that ends the run: without a name, outside every block."""
+    depth = 0
+    for index, instr in enumerate(program):
+        match instr.head:
+            case "SI" | "REPE" | "DEBP" | "DEBM":
+                depth += 1
+            case "FINS" | "FINP" | "FINM":
+                depth = max(depth - 1, 0)
+            case "FIN" if block_name(instr) is not None:
+                depth = max(depth - 1, 0)
+            case "FIN" if depth == 0 and instr.bad is None:
+                return program[: index + 1]
+    return program
+
+
+def _structure(program: list[Instr]) -> list[Diagnostic]:
+    found: list[Diagnostic] = []
+    index = outer = 0
     while index < len(program):
         instr = program[index]
         if instr.head in ("DEBP", "DEBM"):
             if instr.jump is None:
-                found.append(make(1134, "this procedure is never closed", operator="DEBPROC", span=instr.span(),
-                                  hint="write FINP and its results after the last instruction"))
-            else:
-                found.extend(check_structure(program, index + 1, instr.jump))
-                index = instr.jump
+                found.append(
+                    make(
+                        1134,
+                        "this procedure is never closed",
+                        operator="DEBPROC",
+                        span=instr.span(),
+                        hint="write FINP and its results after the last instruction",
+                    )
+                )
+                return found
+            found.extend(_loose(check_structure(program, outer, index)))
+            found.extend(check_structure(program, index + 1, instr.jump))
+            index = instr.jump
+            outer = index + 1
         index += 1
-    return sorted(found, key=lambda d: d.span.start if d.span else 0)
+    found.extend(_loose(check_structure(program, outer, len(program))))
+    return found
+
+
+def _loose(found: list[Diagnostic]) -> list[Diagnostic]:
+    """Keep what is an error outside procedures too: there a SINON or FINSI without SI is passed over."""
+    return [d for d in found if d.code not in ("1020", "1021", "1024")]

@@ -358,8 +358,6 @@ class Evaluator:
             close = nearest(value, known)
             hint = "did you mean {close}?" if close else (
                 "no operator, procedure or object has this name: is it misspelt, or defined later?")
-        elif isinstance(value, str) and isinstance(node, Name):
-            pass  # a variable that holds a word
         elif isinstance(value, str) and find(value) is not None:
             hint = "an operator that follows EXTR, TYPE, CHAI, MOT, LIST or VALE needs parentheses around these"
         elif unknown is not None:

@@ -10,9 +10,9 @@ from typing import Any
 from lark import Lark, Transformer, UnexpectedToken
 from lark.lexer import Lexer
 
-from gibiane.diagnostics import Diagnostic, make
+from gibiane.diagnostics import Diagnostic, Label, Text, make
 from gibiane.lexer import Token, tokens
-from gibiane.nodes import Access, Group, Instr, Literal, Name, Node, Target
+from gibiane.nodes import NAME_LENGTH, Access, Group, Instr, Literal, Name, Node, Target
 from gibiane.source import SourceText, Span
 
 
@@ -103,7 +103,8 @@ def _instruction(source: SourceText, held: list[Token], end: int, errors: dict[i
         instr.bad = failure.diagnostic
         instr.items = [_leaf(t) for t in held if t.type in ("NAME", "STRING", "NUMBER")]
     if lexical:
-        instr.bad = errors[min(lexical)]
+        unclosed = [at for at in lexical if errors[at].code == "G102"]  # it explains the others
+        instr.bad = errors[min(unclosed or lexical)]
         for at in lexical:
             del errors[at]
     if not instr.targets:
@@ -141,9 +142,12 @@ def _explain(source: SourceText, held: list[Token], bad: Any) -> Diagnostic:
     if bad.type == "EQUAL":
         return make(1014, "an = inside a parenthesis", span=Span(source, bad.start_pos, bad.end_pos),
                     hint="assign in an instruction of its own; to compare two values: A EGA B")
-    opening = depth[-1]
-    return make(1, "this parenthesis is not closed before the end of the instruction",
-                span=Span(source, opening.start_pos, opening.end_pos), hint="write the missing ) before the ;")
+    opening, last = (Span(source, token.start_pos, token.end_pos) for token in (depth[-1], held[-1]))
+    labels = [Label(opening, Text("opened here"))]
+    if last.line != opening.line:
+        labels.append(Label(last, Text("the instruction ends here")))
+    return make(1, "this parenthesis is not closed before the end of the instruction", span=opening, labels=labels,
+                hint="write the missing ) before the ;")
 
 
 def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Target]:
@@ -154,12 +158,11 @@ def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Ta
     while i < len(items):
         item = items[i]
         following = items[i + 1] if i + 1 < len(items) else None
-        if isinstance(item, Access) and item.symbol == "%" and isinstance(following, Name):
-            target = Target(following.name, item.start, following.end)
+        if isinstance(item, Access) and item.symbol == "%" and (attribute := _written_name(following)):
+            target = Target(attribute, item.start, items[i + 1].end)
             target.member = True
             i += 2
-        elif isinstance(item, Name | Literal) and (isinstance(item, Name) or item.quoted):
-            name = item.name if isinstance(item, Name) else str(item.value).upper()
+        elif name := _written_name(item):
             target = Target(name, item.start, item.end)
             i += 1
         else:
@@ -193,7 +196,16 @@ def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Ta
     return targets
 
 
-CONTROL_HEADS = frozenset("SI SINO FINS REPE FIN QUIT ITER DEBP FINP ARGU RESP DEBM FINM".split())
+def _written_name(node: Node | None) -> str | None:
+    """Return the name that a word or a string stands for on the left of `=`."""
+    if isinstance(node, Name):
+        return node.name
+    return str(node.value).upper()[:NAME_LENGTH] if isinstance(node, Literal) and node.quoted else None
+
+
+CONTROL_HEADS = frozenset(
+    {"SI", "SINO", "FINS", "REPE", "FIN", "QUIT", "ITER", "DEBP", "FINP", "ARGU", "RESP", "DEBM", "FINM"}
+)
 
 
 def _head(items: list[Node]) -> str | None:
