@@ -70,7 +70,8 @@ def define(ev: Evaluator, program: list[Instr], pc: int) -> int:
         raise GibianeError(make(533, "a procedure needs a name", operator="DEBPROC", span=instr.span()))
     at = instr.items.index(items[1])
     name = (_word(items[1]) or "").upper()[:24]
-    procedure = Procedure(name, parameters(instr, instr.items[at + 1 :]), program, pc + 1, end)
+    procedure = Procedure(name, parameters(instr, instr.items[at + 1 :]), program, pc + 1, end,
+                          instr.head == "DEBM")
     ev.assign_name(name, procedure, instr)
     return end + 1
 
@@ -107,12 +108,17 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
 
 def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:
     """Call a procedure with operands read from the caller's queue; push its results in front."""
+    q.push_front(results(ev, procedure, q, node), node)
+
+
+def results(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> list[Any]:
+    """Call a procedure with operands read from the caller's queue; return its results."""
     span = q.span(node)
     frame = _enter(ev, procedure, q.source, node)
     frame.arguments = q
     for parameter in procedure.parameters:
         _read_parameter(frame.names, parameter, q, procedure, span)
-    q.push_front(_run(ev, frame, procedure, q.source, node), node)
+    return _run(ev, frame, procedure, q.source, node)
 
 
 def _enter(ev: Evaluator, procedure: Procedure, source: SourceText, node: Node) -> Frame:
@@ -120,7 +126,13 @@ def _enter(ev: Evaluator, procedure: Procedure, source: SourceText, node: Node) 
     if ev.frame.depth >= MAX_DEPTH:
         raise GibianeError(make("G103", "calls are nested deeper than {limit}: does {name} call itself without end?",
                                 limit=MAX_DEPTH, name=procedure.name, span=Span(source, node.start, node.end)))
-    return Frame(ev, ev.frame, procedure)
+    frame = Frame(ev, ev.frame, procedure)
+    if procedure.is_method:
+        if procedure.this is None:
+            raise GibianeError(make(153, "the method {name} is called on an object", name=procedure.name,
+                                    span=Span(source, node.start, node.end), hint="O % {name} where O is an OBJET"))
+        frame.this = procedure.this
+    return frame
 
 
 def _run(ev: Evaluator, frame: Frame, procedure: Procedure, source: SourceText, node: Node) -> list[Any]:

@@ -96,12 +96,21 @@ class Procedure(Value):
 
     type_name = PROCEDUR
 
-    def __init__(self, name: str, parameters: list[Parameter], program: list[Instr], start: int, end: int) -> None:
+    def __init__(self, name: str, parameters: list[Parameter], program: list[Instr], start: int, end: int,
+                 is_method: bool = False) -> None:
         self.name = name
         self.parameters = parameters
         self.program = program
         self.start = start
         self.end = end
+        self.is_method = is_method
+        self.this: Objet | None = None
+
+    def of(self, this: Objet) -> Procedure:
+        """Return this method ready to be called on an object."""
+        bound = Procedure(self.name, self.parameters, self.program, self.start, self.end, True)
+        bound.this = this
+        return bound
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the source lines."""
@@ -193,3 +202,19 @@ class Table(Value):
         for index, value in self.entries.values():
             left = f"{type_of(index):<8}      {session.brief(index)}"
             yield f"   {left:<32}{type_of(value):<8}      {session.brief(value)}".rstrip()
+
+
+class Objet(Value):
+    """An OBJET: attributes that only its methods see, and its methods by name."""
+
+    type_name = OBJET
+
+    def __init__(self, class_name: str) -> None:
+        self.class_name = class_name
+        self.attributes = Table()
+        self.methods: dict[str, Procedure] = {}
+
+    def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
+        """Yield the class and the methods."""
+        yield f" OBJET de pointeur {session.ordinal(self)} de classe {self.class_name}"
+        yield f" Methodes : {' '.join(sorted(self.methods))}"

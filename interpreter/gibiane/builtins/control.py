@@ -20,6 +20,10 @@ _WORDS = {
                 "DEBP TWICE x*FLOTTANT ; FINP (2. * x) ; MESS (TWICE 4.) ;"),
     "ARGUMENT": ("read more arguments inside a procedure", "argument*'TYPE'|argument/'TYPE'...",
                  "DEBP F ; ARGU x*ENTIER ; FINP (x + 1) ; MESS (F 2) ;"),
+    "DEBMETH": ("start of a method of objects", "name (argument*'TYPE'|argument/'TYPE')... ; ... FINM results",
+                "DEBM COUNTER n*ENTIER ; %N = n ; FINM ; O = OBJE COUNTER 5 ;"),
+    "FINMETH": ("end of a method, with its results", "(result...)",
+                "DEBM COUNTER n*ENTIER ; %N = n ; FINM ; O = OBJE COUNTER 5 ;"),
     "RESPRO": ("give a result of a procedure before its end", "result...",
                "DEBP F ; RESP 1 ; RESP 2 ; FINP ; A B = F ; MESS A B ;"),
 }
