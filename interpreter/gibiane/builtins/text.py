@@ -133,7 +133,7 @@ def _word(ctx: Context, q: Operands) -> str:
     return str(value)
 
 
-TEXT = operator("TEXTE", topic="values", summary="keep an instruction as text, run where it is read",
+TEXT = operator("TEXTE", topic="values", summary="keep an instruction as text, run where it is read", terminal=True,
                 notice="The text of one elementary instruction; naming the object runs it.",
                 example="T = TEXTE 'MESS 1' ; T ;", see=["MOT"])
 
