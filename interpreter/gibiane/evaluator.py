@@ -154,15 +154,16 @@ class Evaluator:
 
     def assign(self, target: Target, value: Any, instr: Instr) -> None:
         """Bind a value to a target: a name, a table element, or an attribute of an object."""
-        if target.member:
-            self.frame.this.attributes[target.name] = value
+        if target.member and not target.path:
+            objects.assign(self, target, value, instr.at(target))
             return
         if not target.path:
             self.assign_name(target.name, value, instr)
             if self.session.options["WARN"]:
                 self._warn_hidden_operator(target, instr)
             return
-        container = self.frame.lookup(target.name)
+        container = (objects.attribute(self, target.name, instr.at(target)) if target.member
+                     else self.frame.lookup(target.name))
         for step, (_, index) in enumerate(target.path):
             if not isinstance(container, Table):
                 shown = type_of(container) if container is not ABSENT else "MOT"
