@@ -17,7 +17,7 @@ def problems(source: SourceText) -> list[Diagnostic]:
     sound, for a lost `;` takes block words with it.
     """
     program = parse(source)
-    lost = slips.apostrophe(source) if slips.ends_in_string(program) else None
+    lost = slips.apostrophe(source)[0] if slips.ends_in_string(program) else None
     read = _until_end(program)
     if lost is None or read[-1].end <= lost:
         program = read

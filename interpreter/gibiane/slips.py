@@ -103,11 +103,16 @@ def ends_in_string(program: list[Instr]) -> bool:
 
 
 def _mark_apostrophe(source: SourceText, program: list[Instr]) -> None:
-    at = apostrophe(source)
+    at, end = apostrophe(source)
+    first, last = Span(source, at, at + 1), Span(source, end, end + 1)
+    labels = [Label(first, Text("this one may open or close a string by mistake"))]
+    if last.line != first.line:
+        labels.append(Label(last, Text("the string would go on after this")))
     found = make(
         "G102",
         "an apostrophe is missing on this line, or one is too many",
-        span=Span(source, at, at + 1),
+        span=first,
+        labels=labels,
         hint="a string is closed by an apostrophe; inside a string an apostrophe is written twice",
     )
     for index, instr in enumerate(program):
@@ -118,11 +123,12 @@ def _mark_apostrophe(source: SourceText, program: list[Instr]) -> None:
             return
 
 
-def apostrophe(source: SourceText) -> int:
+def apostrophe(source: SourceText) -> tuple[int, int]:
     """Return where the lost or doubled apostrophe of a text with an odd number of them most likely is.
 
     A string that goes over the end of a line is suspicious if that line seems to end an instruction, or if what
-    the next apostrophe cuts is the middle of a word.
+    the next apostrophe cuts is the middle of a word. The first place is the apostrophe that opens that string, the
+    second the end of the suspicious line.
     """
     is_open = False
     start = last = opened = 0
@@ -135,9 +141,9 @@ def apostrophe(source: SourceText) -> int:
             if quotes % 2:
                 is_open, opened = not is_open, last
             if is_open and _looks_inverted(line, quotes, lines, number + 1):
-                return opened
+                return opened, start + max(len(line.rstrip()) - 1, 0)
         start += len(line) + 1
-    return last
+    return last, last
 
 
 def _looks_inverted(line: str, quotes: int, lines: list[str], following: int) -> bool:

@@ -217,7 +217,8 @@ def _head(items: list[Node]) -> str | None:
         key = word[:4]
         if key in CONTROL_HEADS:
             return str(key)
-        if isinstance(item, Name) and any(isinstance(n, Name) and n.word == "SI" for n in items):
+        last = items[-1]
+        if isinstance(item, Name) and isinstance(last, Name) and last.word == "SI" and key not in ("COMM", "MESS"):
             return "SI"  # `ok SI ;`
         return None
     return None
