@@ -24,6 +24,10 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "REGLER": ("gibiane_ops.mesh.surfaces",),
     "DALLER": ("gibiane_ops.mesh.surfaces",),
     "VOLUME": ("gibiane_ops.mesh.volumes", "gibiane_ops.mesh.filling"),
+    "CHANGER": ("gibiane_ops.mesh.conversion",),
+    "ORIENTER": ("gibiane_ops.mesh.conversion",),
+    "REGENERER": ("gibiane_ops.mesh.conversion",),
+    "ARETE": ("gibiane_ops.mesh.conversion",),
     "SURFACE": ("gibiane_ops.mesh.filling",),
     "MAILLER": ("gibiane_ops.mesh.filling",),
     "REMAILLER": ("gibiane_ops.mesh.remeshing",),
@@ -47,7 +51,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "AFFINITE": ("gibiane_ops.mesh.transforms",),
     "DEPLACER": ("gibiane_ops.mesh.transforms",),
     # lists
-    "SORTIR": ("gibiane_ops.lists.files",),
+    "SORTIR": ("gibiane_ops.lists.files", "gibiane_ops.output.files"),
     "LIRE": ("gibiane_ops.lists.files",),
     "OBTENIR": ("gibiane_ops.lists.files",),
     "ACQUERIR": ("gibiane_ops.lists.files",),
@@ -126,8 +130,13 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     # smoothing, error, sizes
     "LISSER": ("gibiane_ops.smoothing",),
     "TAILLE": ("gibiane_ops.sizes",),
+    # pictures and files
+    "DEFORME": ("gibiane_ops.output.shapes",),
+    "VECTEUR": ("gibiane_ops.output.shapes",),
+    "TRACER": ("gibiane_ops.output.trace",),
+    "DESSIN": ("gibiane_ops.output.draw",),
     # operators of the language with further forms
-    "ET": ("gibiane_ops.lists.access", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves", "gibiane_ops.mesh.merging"),
+    "ET": ("gibiane_ops.lists.access", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
     "EXISTE": ("gibiane_ops.fields.components",),
     "ERREUR": ("gibiane_ops.error",),
 }

@@ -219,10 +219,10 @@ def _with_contact(
         ChamZone(zone, ("SOLI", "CONT", "TOTA"), np.stack(column, axis=1)[:, None, :])
         for zone, column in zip(parts.zones, columns, strict=True)
     ]
-    field = MChaml(zones, SCALAIRE, "GRAVITE")
+    field = MChaml(zones, SCALAIRE, "GRAVITE", "error")
     if tabl:
         table = _table(result, parts, field, norm)
-        table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE"))
+        table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE", "error"))
         return table
     return result.solid, result.contact, result.total, field
 

@@ -193,11 +193,15 @@ def _ener(ctx: Context, model: Modele, stress: MChaml, strain: MChaml) -> MChaml
         a, b = on_zone(ctx, stress, zone, "stress").values, on_zone(ctx, strain, zone, "strain").values
         a, b = (moved(shape(zone.shape), v, f.support, "STRESSES") for v, f in ((a, stress), (b, strain)))
         zones.append(ChamZone(zone, [SCAL], (a * b).sum(axis=2, keepdims=True)))
-    return MChaml(zones, SCALAIRE, "STRESSES")
+    return MChaml(zones, SCALAIRE, "STRESSES", "energy")
 
 
 def _scalar(
-    ctx: Context, model: Modele, fields: list[tuple[str, MChaml | None]], measure: Callable[[FloatArray], FloatArray]
+    ctx: Context,
+    model: Modele,
+    fields: list[tuple[str, MChaml | None]],
+    measure: Callable[[FloatArray], FloatArray],
+    title: str,
 ) -> MChaml:
     """Return the element field that a formula gives of a stress, on the support of the stress."""
     (stress,) = told_apart(ctx, fields, STRESS)
@@ -205,7 +209,7 @@ def _scalar(
         ChamZone(z, [SCAL], measure(on_zone(ctx, stress, z, "stress").values)[..., None])
         for z in solid_zones(ctx, model)
     ]
-    return MChaml(zones, SCALAIRE, stress.support)
+    return MChaml(zones, SCALAIRE, stress.support, title)
 
 
 VMIS = operator(
@@ -230,14 +234,14 @@ TRES = operator(
     Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("more", MCHAML, optional=True), gives=[MCHAML]
 )
 def _vmis(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> MChaml:
-    return _scalar(ctx, model, [("stress", stress), ("more", more)], invariants.von_mises)
+    return _scalar(ctx, model, [("stress", stress), ("more", more)], invariants.von_mises, "von Mises")
 
 
 @TRES.form(
     Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("more", MCHAML, optional=True), gives=[MCHAML]
 )
 def _tres(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> MChaml:
-    return _scalar(ctx, model, [("stress", stress), ("more", more)], invariants.tresca)
+    return _scalar(ctx, model, [("stress", stress), ("more", more)], invariants.tresca, "Tresca")
 
 
 def _tensor(ctx: Context, field: MChaml, zone: ModelZone) -> FloatArray:

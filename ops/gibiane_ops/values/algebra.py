@@ -31,7 +31,7 @@ def mapped(field: Field, function: Callable[[FloatArray], FloatArray]) -> Field:
         parts = {name: (nodes, function(values)) for name, (nodes, values) in field.parts.items()}
         return ChPoint(field.store, parts, field.nature, field.title)
     zones = [ChamZone(z.zone, z.names, function(z.values)) for z in field.zones]
-    return MChaml(zones, field.subtype, field.support)
+    return MChaml(zones, field.subtype, field.support, field.title)
 
 
 def values_of(field: Field, names: Sequence[str] | None = None) -> FloatArray:
@@ -169,7 +169,9 @@ def chosen(field: Field, names: Sequence[str], new: Sequence[str] | None = None,
             )
     if isinstance(field, ChPoint):
         parts = {renamed[n]: field.parts[n] for n in names if n in field.parts}
-        return ChPoint(field.store, parts, field.nature, field.title)
+        # a component renamed SCAL is known by its old name in pictures
+        title = names[0] if len(names) == 1 and renamed[names[0]] == SCAL != names[0] else field.title
+        return ChPoint(field.store, parts, field.nature, title)
     zones = []
     for zone in field.zones:
         kept = [n for n in names if n in zone.names]

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from gibiane.fortran import scientific
 from gibiane.values import CHPOINT, MCHAML, Value
-
 from gibiane_ops.values.modele import ContactZone, ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore
 
@@ -131,10 +131,11 @@ class MChaml(Value):
 
     type_name = MCHAML
 
-    def __init__(self, zones: Sequence[ChamZone], subtype: str, support: str) -> None:
+    def __init__(self, zones: Sequence[ChamZone], subtype: str, support: str, title: str = "") -> None:
         self.zones = list(zones)
         self.subtype = subtype
         self.support = support
+        self.title = title
 
     @property
     def names(self) -> list[str]:

@@ -1,0 +1,1 @@
+"""Operators that make pictures and files: DEFORME, VECTEUR, TRACER, DESSINER, SORTIR 'VTK'."""

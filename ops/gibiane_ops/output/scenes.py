@@ -1,0 +1,234 @@
+"""From objects of the language to the layers of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.plot.layers import (
+    BODY_COLORS,
+    Arrows,
+    Dots,
+    Layer,
+    Lines,
+    Surface,
+    amplification,
+    lifts,
+    outline,
+)
+from gibiane_ops.kernels.plot.skin import skin
+from gibiane_ops.kernels.recovery import nodal_mean
+from gibiane_ops.kernels.supports import moved
+from gibiane_ops.kernels.topology import solids
+from gibiane_ops.output.targets import COLOURS
+from gibiane_ops.values.champs import ChPoint, MChaml
+from gibiane_ops.values.deformee import Shape, Vecteur
+from gibiane_ops.values.maillage import COLOURS as COLOUR_NAMES
+from gibiane_ops.values.maillage import Block, Maillage
+from gibiane_ops.values.modele import DISPLACEMENTS, ModelZone
+from gibiane_ops.values.nodes import FloatArray, IntArray
+
+KernelBlock = tuple[str, IntArray]
+Plane = tuple[FloatArray, FloatArray]
+MANY_PIECES = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How a scene is shown.
+
+    Attributes
+    ----------
+    plane : (point, normal towards the eye), optional
+        What lies on the side of the normal is taken away.
+    shrink : float, optional
+        Factor by which each element is reduced.
+    apart : float, optional
+        How far the solids are moved from one another.
+    edges : bool
+        Show the edges of the elements.
+    """
+
+    plane: Plane | None = None
+    shrink: float | None = None
+    apart: float | None = None
+    edges: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Values:
+    """Values to show on cells: at the nodes (not-a-number where there is none), or one for each cell."""
+
+    nodal: FloatArray | None = None
+    flat: FloatArray | None = None
+
+
+def displaced(points: FloatArray, item: Shape) -> tuple[FloatArray, float]:
+    """Return the moved points of a DEFORME, and the factor used."""
+    nodes = item.mesh.nodes
+    dim = points.shape[1]
+    u = np.zeros_like(points)
+    family = "AXIS" if "UR" in item.displacement.names else "TRID"
+    for axis, name in enumerate(DISPLACEMENTS[family][:dim]):
+        u[nodes, axis] = item.displacement.at(name, nodes)
+    factor = amplification(points[nodes], u[nodes]) if item.factor is None else item.factor
+    return points + factor * u, factor
+
+
+def of_chpoint(field: ChPoint, name: str) -> Values:
+    """Return a component of a nodal field as values to show."""
+    nodal = np.full(field.store.count, np.nan)
+    nodes, values = field.parts[name]
+    nodal[nodes] = values
+    return Values(nodal=nodal)
+
+
+def of_zone(field: MChaml, on: ModelZone, values: FloatArray, n_points: int) -> Values:
+    """Return values (m, q) of an element field on a zone: by element, or averaged at the nodes of the zone."""
+    if values.shape[1] == 1:
+        return Values(flat=values[:, 0])
+    at_nodes = moved(shape(on.shape), values[..., None], field.support, "NOEUD")
+    nodal = np.full(n_points, np.nan)
+    used = np.unique(on.cells)
+    local = np.searchsorted(used, on.cells)
+    nodal[used] = nodal_mean(len(used), [local], [at_nodes])[:, 0]
+    return Values(nodal=nodal)
+
+
+def cells_layers(
+    points: FloatArray,
+    blocks: Sequence[KernelBlock],
+    look: Look,
+    values: Values | None = None,
+    colours: Sequence[str] | None = None,
+    label: str = "",
+    first: int = 0,
+) -> list[Layer]:
+    """Return the surfaces of the solids and surfaces among some blocks, one per piece and colour.
+
+    `colours` has one word of colour per cell ("DEFA" takes the colour of the piece); `first` numbers the pieces.
+    """
+    blocks = [(name, cells) for name, cells in blocks if shape(name).dim >= 2]
+    if not blocks:
+        return []
+    count, piece_of_node = solids(blocks, len(points))
+    pieces = np.concatenate([piece_of_node[cells[:, 0]] for _, cells in blocks])
+    if count > MANY_PIECES:
+        pieces, count = np.zeros_like(pieces), 1
+    nodes = [
+        np.unique(np.concatenate([c[pieces[a : a + len(c)] == k].ravel() for a, c in _starts(blocks)]))
+        for k in range(count)
+    ]
+    shifts = lifts([points[n] for n in nodes], look.apart) if look.apart is not None else [None] * count
+    layers: list[Layer] = []
+    for k in range(count):
+        words = np.array(colours)[pieces == k] if colours is not None else np.array(["DEFA"])
+        for word in np.unique(words):
+            keep = pieces == k if colours is None else (pieces == k) & (np.array(colours) == word)
+            seen = skin(points, blocks, plane=look.plane, shrink=look.shrink, keep=keep)
+            if not seen.facets:
+                continue
+            nodal = values.nodal[seen.node] if values is not None and values.nodal is not None else None
+            flat = values.flat[seen.cell] if values is not None and values.flat is not None else None
+            shade = COLOURS.get(str(word), "") or BODY_COLORS[(first + k) % len(BODY_COLORS)]
+            layers.append(
+                Surface(seen.points, seen.facets, nodal, flat, shade, look.edges, label=label, offset=shifts[k])
+            )
+            label = ""  # one entry of the legend for an object of several pieces
+    return layers
+
+
+def _starts(blocks: Sequence[KernelBlock]) -> list[tuple[int, IntArray]]:
+    start, result = 0, []
+    for _, cells in blocks:
+        result.append((start, cells))
+        start += len(cells)
+    return result
+
+
+def mesh_layers(
+    points: FloatArray,
+    mesh: Maillage,
+    look: Look,
+    *,
+    colour: str = "",
+    label: str = "",
+    values: Values | None = None,
+    first: int = 0,
+) -> list[Layer]:
+    """Return the layers of a mesh: solids and surfaces filled, lines, points."""
+    solid = [b for b in mesh.blocks if shape(b.shape).dim >= 2]
+    words = [colour or COLOUR_NAMES[c] for b in solid for c in b.colours]
+    layers = cells_layers(points, [(b.shape, b.cells) for b in solid], look, values, words, label, first)
+    for block in mesh.blocks:
+        dim = shape(block.shape).dim
+        if dim < 2:
+            layers += _thin(points, block, dim, colour, "" if layers else label)
+    return layers
+
+
+def _thin(points: FloatArray, block: Block, dim: int, colour: str, label: str) -> list[Layer]:
+    layers: list[Layer] = []
+    for index in np.unique(block.colours):
+        word = colour or COLOUR_NAMES[index]
+        cells = block.cells[block.colours == index]
+        if dim == 1:
+            layers.append(Lines(points, cells[:, :2], COLOURS.get(word) or "#20324a", 1.6, label=label))
+        else:
+            layers.append(Dots(points[cells[:, 0]], COLOURS.get(word) or "#b3261e", label=label))
+        label = ""
+    return layers
+
+
+def outline_layers(points: FloatArray, mesh: Maillage, colour: str = "") -> list[Layer]:
+    """Return the sharp edges of a mesh, as lines."""
+    blocks = [b for b in mesh.kernel_blocks if shape(b[0]).dim >= 2]
+    layers = [
+        layer
+        for b in mesh.blocks
+        if shape(b.shape).dim < 2
+        for layer in _thin(points, b, shape(b.shape).dim, colour, "")
+    ]
+    if blocks:
+        seen = skin(points, blocks)
+        edges = outline(points, seen.facets) if points.shape[1] == 3 else _rim(seen.facets)
+        layers.append(Lines(points, edges, COLOURS.get(colour) or "#5f6b7a", 1.0, "--"))
+    return layers
+
+
+def _rim(facets: Sequence[IntArray]) -> IntArray:
+    """Return the edges used by one facet only."""
+    sides = np.concatenate([np.stack([f, np.roll(f, -1, axis=1)], axis=2).reshape(-1, 2) for f in facets])
+    unique, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    return np.asarray(unique[count == 1], np.int64)
+
+
+def arrow_layers(points: FloatArray, vectors: Vecteur, size: float) -> list[Layer]:
+    """Return the arrows of a VECTEUR; `size` is the diagonal of the scene."""
+    layers: list[Layer] = []
+    dim = points.shape[1]
+    for arrow in vectors.arrows:
+        nodes = arrow.field.nodes
+        values = np.zeros((len(nodes), dim))
+        for axis, name in enumerate(arrow.names[:dim]):
+            values[:, axis] = arrow.field.at(name, nodes)
+        length = np.linalg.norm(values, axis=1)
+        largest = float(length.max(initial=0.0))
+        kept = length > 1e-12 * largest
+        if not kept.any():
+            continue
+        longest = 0.12 if arrow.factor is None else abs(arrow.factor) * largest / size
+        start = points[nodes[kept]]
+        if arrow.factor is not None and arrow.factor < 0:
+            start = start + arrow.factor * values[kept]
+        label = " ".join(arrow.names)
+        layers.append(Arrows(start, values[kept], longest, COLOURS.get(arrow.colour) or "#111111", label))
+    return layers
+
+
+def diagonal(points: FloatArray, nodes: IntArray) -> float:
+    """Return the diagonal of the box of some points, 1 when it is a point."""
+    return float(np.linalg.norm(np.ptp(points[nodes], axis=0))) or 1.0 if len(nodes) else 1.0

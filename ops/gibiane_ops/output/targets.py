@@ -1,0 +1,89 @@
+"""The files that pictures go to: their names, their numbers, and what happens without matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from gibiane.registry import Context
+from gibiane_ops.kernels.errors import MissingPackage
+from gibiane_ops.values.failures import worded
+
+EXTENSIONS = (".png", ".svg", ".pdf")
+COLOURS = {
+    "DEFA": "",
+    "BLEU": "#2f6fb3",
+    "ROUG": "#c0392b",
+    "ROSE": "#d96a9b",
+    "VERT": "#2e8b57",
+    "TURQ": "#2aa7a0",
+    "JAUN": "#e0b400",
+    "BLAN": "#f2f2f2",
+    "NOIR": "#1b1f24",
+    "VIOL": "#7d4fa8",
+    "ORAN": "#d97a26",
+    "AZUR": "#6fb1e0",
+    "OCEA": "#1c4e80",
+    "CYAN": "#22b8cf",
+    "OLIV": "#7a8a2a",
+    "GRIS": "#9aa0a6",
+}
+"""Colours of the language on paper."""
+
+
+def colour(word: str) -> str:
+    """Return the colour of a word of the language for the kernel, "" for the default one."""
+    return COLOURS.get(word[:4].upper(), "")
+
+
+def next_path(ctx: Context) -> Path:
+    """Return the file of the next picture: name of OPTI 'FTRA' (or traces/trace), number from 001, extension."""
+    wanted = ctx.session.options.get("FTRA")
+    base = Path(wanted) if isinstance(wanted, str) and wanted.strip() else Path("traces/trace")
+    extension = base.suffix.lower() if base.suffix.lower() in EXTENSIONS else ""
+    if not extension:
+        device = ctx.session.options.get("TRAC")
+        extension = f".{device[:3].lower()}" if isinstance(device, str) and device[:3] in ("SVG", "PDF") else ".png"
+    stem = base.with_suffix("") if base.suffix.lower() in (*EXTENSIONS, ".ps") else base
+    counts: dict[str, int] = ctx.state.setdefault("pictures", {})
+    number = counts[stem.as_posix()] = counts.get(stem.as_posix(), 0) + 1
+    return stem.with_name(f"{stem.name}_{number:03d}{extension}")
+
+
+def draw(ctx: Context, picture: Callable[[Path], None], at: str | None = None) -> None:
+    """Write the next picture; without matplotlib say so once and go on: pictures never change results."""
+    path = next_path(ctx)
+    try:
+        with worded(ctx, at=at):
+            _attempt(ctx, picture, path)
+    except OSError as failure:
+        ctx.fail(
+            1130,
+            "the picture {path} cannot be written ({reason})",
+            path=path.as_posix(),
+            reason=(failure.strerror or "unknown reason").lower(),
+        )
+
+
+def _attempt(ctx: Context, picture: Callable[[Path], None], path: Path) -> None:
+    try:
+        picture(path)
+    except MissingPackage as failure:
+        if not ctx.state.get("no pictures"):
+            ctx.state["no pictures"] = True
+            ctx.warn(
+                "G201",
+                "no picture is drawn: the package {package} is not installed",
+                package=failure.package,
+                install=failure.install,
+                hint="{install}",
+            )
+        return
+    if ctx.option("ECHO") >= 1:
+        ctx.write(f" {ctx.operator.name} : {path.as_posix()}")
+
+
+def title(ctx: Context, given: str | None) -> str:
+    """Return the title of a picture: the one given, else that of OPTI TITR or TITRE."""
+    text = given if given is not None else ctx.session.options.get("TITR")
+    return text.strip() if isinstance(text, str) else ""
