@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from gibiane.registry import Context
 
+from gibiane.registry import Context
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
 from gibiane_ops.kernels.mesh import chains, orientation, subdivision
@@ -40,8 +40,12 @@ def _degree_one(ctx: Context) -> str:
     dimension(ctx)
     element = ctx.option("ELEM") or ""
     if element in SECOND_DEGREE:
-        ctx.fail(251, "elements of second degree ({element}) are not available yet", element=element,
-                 hint="OPTI ELEM CUB8, TET4, QUA4, TRI3 or SEG2")
+        ctx.fail(
+            251,
+            "elements of second degree ({element}) are not available yet",
+            element=element,
+            hint="OPTI ELEM CUB8, TET4, QUA4, TRI3 or SEG2",
+        )
     return str(element)
 
 
@@ -68,7 +72,9 @@ def new_point(ctx: Context, coords: FloatArray, density: float | None = None) ->
     return Point(store, int(store.add([coords], ctx.option("DENS") if density is None else density)[0]))
 
 
-def new_mesh(ctx: Context, parts: Sequence[tuple[str, IntArray]], sides: Mapping[str, Maillage] | None = None) -> Maillage:
+def new_mesh(
+    ctx: Context, parts: Sequence[tuple[str, IntArray]], sides: Mapping[str, Maillage] | None = None
+) -> Maillage:
     """Make a mesh in the current colour (OPTI COUL)."""
     colour = COLOURS.index(ctx.option("COUL")) if ctx.session.options.get("COUL") else 0
     blocks = [Block(name, cells, np.full(len(cells), colour, np.int64)) for name, cells in parts if len(cells)]
@@ -86,8 +92,14 @@ def line_segments(ctx: Context, mesh: Maillage, at: str) -> IntArray:
     block = mesh.single()
     if block is None or block.shape not in LINES:
         shapes = " ".join(mesh.shapes) or "no element"
-        ctx.fail(16, "a line is wanted, this mesh holds {shapes}", at=at, shapes=shapes, label="holds {shapes}",
-                 hint="COTE and CONT give the lines of a surface")
+        ctx.fail(
+            16,
+            "a line is wanted, this mesh holds {shapes}",
+            at=at,
+            shapes=shapes,
+            label="holds {shapes}",
+            hint="COTE and CONT give the lines of a surface",
+        )
     return block.cells
 
 
@@ -103,8 +115,13 @@ def line_nodes(ctx: Context, mesh: Maillage, at: str) -> IntArray:
     if not chains.is_chain(segments):
         segments = segments[chains.walk(segments)]
         if not chains.is_chain(segments):
-            ctx.fail(21, "this line is in several pieces, or its segments turn different ways", at=at,
-                     label="not one continuous line", hint="ET joins lines that follow one another; INVE turns one over")
+            ctx.fail(
+                21,
+                "this line is in several pieces, or its segments turn different ways",
+                at=at,
+                label="not one continuous line",
+                hint="ET joins lines that follow one another; INVE turns one over",
+            )
     return chains.chain_nodes(segments)
 
 
@@ -130,8 +147,10 @@ def join(meshes: Sequence[Maillage], sides: Mapping[str, Maillage] | None = None
     for mesh in meshes:
         for block in mesh.blocks:
             by_shape.setdefault(block.shape, []).append(block)
-    blocks = [Block(name, np.concatenate([b.cells for b in each]), np.concatenate([b.colours for b in each]))
-              for name, each in by_shape.items()]
+    blocks = [
+        Block(name, np.concatenate([b.cells for b in each]), np.concatenate([b.colours for b in each]))
+        for name, each in by_shape.items()
+    ]
     return Maillage(meshes[0].store, blocks, dict(sides or {}))
 
 
@@ -148,8 +167,12 @@ def places_along(ctx: Context, length: float, start: float, end: float, count: i
     except BadValue as failure:
         if failure.what == "length":
             ctx.fail(21, "its two ends are at the same place: there is nothing to mesh")
-        ctx.fail(809, "a number of elements or densities are needed: the density here is {value}", value=failure.value,
-                 hint="give a number of elements, or DENS 0.1 ; before the points, or 'DINI' and 'DFIN'")
+        ctx.fail(
+            809,
+            "a number of elements or densities are needed: the density here is {value}",
+            value=failure.value,
+            hint="give a number of elements, or DENS 0.1 ; before the points, or 'DINI' and 'DFIN'",
+        )
 
 
 def tolerance_of(ctx: Context, given: float | None, nodes: Any) -> float:
@@ -161,8 +184,12 @@ def tolerance_of(ctx: Context, given: float | None, nodes: Any) -> float:
         return density / 10
     x = nodes_of(ctx).coords[nodes]
     size = 1e-6 * float(np.linalg.norm(np.ptp(x, axis=0))) if len(x) else 0.0
-    ctx.warn(0, "no distance is given and the density is 0: {value} is taken (a millionth of the mesh)",
-             value=f"{size:.3g}", hint="give a distance, or set DENS")
+    ctx.warn(
+        0,
+        "no distance is given and the density is 0: {value} is taken (a millionth of the mesh)",
+        value=f"{size:.3g}",
+        hint="give a distance, or set DENS",
+    )
     return size
 
 
@@ -180,13 +207,24 @@ def axis_end(ctx: Context, a: Point, b: Point | None) -> FloatArray:
 def reference(ctx: Context, g: Maillage, i: int | None, what: str) -> Any:
     """Return a recorded side or face of a mesh, or all of them."""
     if not g.sides:
-        ctx.fail(24, "this mesh has no recorded {what}", at="g", what=what,
-                 hint="only the mesh made by one operator has them, not its unions; CONT and ENVE give its boundary")
+        ctx.fail(
+            24,
+            "this mesh has no recorded {what}",
+            at="g",
+            what=what,
+            hint="only the mesh made by one operator has them, not its unions; CONT and ENVE give its boundary",
+        )
     if i is None:
         return tuple(g.sides.values())
     if str(i) not in g.sides:
-        ctx.fail(24, "there is no {what} {number}: this mesh has {known}", at="i", what=what, number=i,
-                 known=" ".join(g.sides))
+        ctx.fail(
+            24,
+            "there is no {what} {number}: this mesh has {known}",
+            at="i",
+            what=what,
+            number=i,
+            known=" ".join(g.sides),
+        )
     return g.sides[str(i)]
 
 

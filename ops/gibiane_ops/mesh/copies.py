@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from gibiane.registry import Context
 
+from gibiane.registry import Context
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import orientation
 from gibiane_ops.kernels.mesh.transforms import Affine
@@ -38,8 +38,13 @@ class Copier:
         The same as a linear map: elements turn over and vector components turn with it.
     """
 
-    def __init__(self, ctx: Context, objects: Sequence[Any], move: Callable[[FloatArray, Any], FloatArray],
-                 motion: Affine | None = None) -> None:
+    def __init__(
+        self,
+        ctx: Context,
+        objects: Sequence[Any],
+        move: Callable[[FloatArray, Any], FloatArray],
+        motion: Affine | None = None,
+    ) -> None:
         self.ctx = ctx
         self.objects = objects
         self.motion = motion
@@ -109,7 +114,9 @@ class Copier:
                 nodes = np.unique(np.concatenate([parts[name][0] for name in present]))
                 turned = copy.table(names, nodes) @ _isometry(self.motion).T
                 dim = int(self.ctx.option("DIME"))
-                parts.update({name: (nodes, turned[:, i]) for i, name in enumerate(names) if name in present or i < dim})
+                parts.update(
+                    {name: (nodes, turned[:, i]) for i, name in enumerate(names) if name in present or i < dim}
+                )
         return ChPoint(self.store, parts, field.nature, field.title)
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, POINT
-
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import edges
 from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, surface_shape
@@ -36,14 +36,29 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
     name = next((n for n in ("SCAL", "G") if n in size.names), None)
     if name is None:
         if {"G11", "G22"} & set(size.names):
-            ctx.fail(251, "sizes that depend on the direction (components {names}) are not available", at=at,
-                     names=" ".join(size.names), hint="a field SCAL holds edge lengths, a field G their square inverses")
-        ctx.fail(181, "a field of sizes has the component SCAL (edge length) or G (its square inverse), not {names}",
-                 at=at, names=" ".join(size.names) or "none")
+            ctx.fail(
+                251,
+                "sizes that depend on the direction (components {names}) are not available",
+                at=at,
+                names=" ".join(size.names),
+                hint="a field SCAL holds edge lengths, a field G their square inverses",
+            )
+        ctx.fail(
+            181,
+            "a field of sizes has the component SCAL (edge length) or G (its square inverse), not {names}",
+            at=at,
+            names=" ".join(size.names) or "none",
+        )
     missing = np.setdiff1d(nodes, size.parts[name][0])
     if len(missing):
-        ctx.fail(181, "the field of sizes has no value at {count} of {total} nodes", at=at, count=len(missing),
-                 total=len(nodes), hint="it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field")
+        ctx.fail(
+            181,
+            "the field of sizes has no value at {count} of {total} nodes",
+            at=at,
+            count=len(missing),
+            total=len(nodes),
+            hint="it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field",
+        )
     values = size.at(name, nodes)
     if not (values > 0).all():
         ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=f"{values.min():.6g}")
@@ -59,7 +74,7 @@ def _numbered(ctx: Context, cells: list[IntArray]) -> tuple[IntArray, list[IntAr
 def _added(ctx: Context, nodes: IntArray, points: FloatArray) -> IntArray:
     """Return ids for the points of a filled mesh: those given first, then new nodes of their mean density."""
     store = nodes_of(ctx)
-    inner = points[len(nodes):]
+    inner = points[len(nodes) :]
     new = store.add(inner, float(store.density[nodes].mean())) if len(inner) else np.zeros(0, np.int64)
     return np.concatenate([nodes, new])
 
@@ -95,10 +110,17 @@ def _check_closed(ctx: Context, facets: IntArray, at: str) -> None:
     if len(loose) == 0:
         return
     a, b = nodes_of(ctx).coords[loose[0]]
-    ctx.fail(127, "the envelope is not closed: {count} edge(s) do not belong to exactly two facets, the first from "
-             "({a}) to ({b})", at=at, count=len(loose), a=", ".join(f"{x:.6g}" for x in a),
-             b=", ".join(f"{x:.6g}" for x in b), label="open, or facets that are there twice",
-             hint="ELIM joins surfaces that only touch; CONT shows the open edges")
+    ctx.fail(
+        127,
+        "the envelope is not closed: {count} edge(s) do not belong to exactly two facets, the first from "
+        "({a}) to ({b})",
+        at=at,
+        count=len(loose),
+        a=", ".join(f"{x:.6g}" for x in a),
+        b=", ".join(f"{x:.6g}" for x in b),
+        label="open, or facets that are there twice",
+        hint="ELIM joins surfaces that only touch; CONT shows the open edges",
+    )
 
 
 def lines_of(mesh: Maillage) -> IntArray:
@@ -110,67 +132,112 @@ def lines_of(mesh: Maillage) -> IntArray:
 def _contour(ctx: Context, g: Maillage, at: str) -> IntArray:
     segments = lines_of(g)
     if len(segments) == 0 or len(g.shapes) > 1:
-        ctx.fail(16, "closed lines are wanted, this mesh holds {shapes}", at=at, shapes=" ".join(g.shapes) or "no element",
-                 hint="CONT gives the contour of a surface")
+        ctx.fail(
+            16,
+            "closed lines are wanted, this mesh holds {shapes}",
+            at=at,
+            shapes=" ".join(g.shapes) or "no element",
+            hint="CONT gives the contour of a surface",
+        )
     return segments
 
 
-SURF = operator("SURFACE", topic="mesh", summary="mesh of the inside of a closed line",
-                notice="`S = SURF L 'PLAN'` fills plane closed lines, the largest outside and the others as holes, with "
-                       "triangles or quadrangles (OPTI ELEM). The segments of the lines are kept as they are; inside, the "
-                       "elements follow their lengths, or the CHPOINT or FLOTTANT given. Elements turn as the outer line does.",
-                example="OPTI DIME 2 ELEM TRI3 ; C = CERC 24 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; "
-                        "S = SURF C 'PLAN' ; MESS ((MESU S) > 3.) ;",
-                see=["DALLER", "MAILLER", "CONTOUR"])
+SURF = operator(
+    "SURFACE",
+    topic="mesh",
+    summary="mesh of the inside of a closed line",
+    notice="`S = SURF L 'PLAN'` fills plane closed lines, the largest outside and the others as holes, with "
+    "triangles or quadrangles (OPTI ELEM). The segments of the lines are kept as they are; inside, the "
+    "elements follow their lengths, or the CHPOINT or FLOTTANT given. Elements turn as the outer line does.",
+    example="OPTI DIME 2 ELEM TRI3 ; C = CERC 24 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; "
+    "S = SURF C 'PLAN' ; MESS ((MESU S) > 3.) ;",
+    see=["DALLER", "MAILLER", "CONTOUR"],
+)
 
 
-@SURF.form(Arg("g", MAILLAGE, "closed lines"), SIZE,
-           Key(("PLAN", "SPHE", "CYLI", "CONI", "TORI"), "surface that holds the nodes",
-               Arg("points", POINT, many=True, optional=True), name="on"), gives=[MAILLAGE])
+@SURF.form(
+    Arg("g", MAILLAGE, "closed lines"),
+    SIZE,
+    Key(
+        ("PLAN", "SPHE", "CYLI", "CONI", "TORI"),
+        "surface that holds the nodes",
+        Arg("points", POINT, many=True, optional=True),
+        name="on",
+    ),
+    gives=[MAILLAGE],
+)
 def _surface(ctx: Context, g: Maillage, size: Size, on: Any) -> Maillage:
     if on is not None and on[0] != "PLAN":
-        ctx.fail(251, "SURF on a curved surface ('{kind}') is not available", at="on", kind=on[0],
-                 hint="DALL can put its nodes on a sphere, a cylinder or a cone")
+        ctx.fail(
+            251,
+            "SURF on a curved surface ('{kind}') is not available",
+            at="on",
+            kind=on[0],
+            hint="DALL can put its nodes on a sphere, a cylinder or a cone",
+        )
     return fill_contour(ctx, _contour(ctx, g, "g"), size, surface_shape(ctx) == "QUA4", "g")
 
 
 def _envelope(ctx: Context, g: Maillage, at: str) -> IntArray:
     facets = g.cells("TRI3")
     if "QUA4" in g.shapes:
-        ctx.fail(16, "this envelope holds quadrangles (QUA4); tetrahedra need triangles", at=at,
-                 hint="CHAN TRI3 cuts quadrangles in two")
+        ctx.fail(
+            16,
+            "this envelope holds quadrangles (QUA4); tetrahedra need triangles",
+            at=at,
+            hint="CHAN TRI3 cuts quadrangles in two",
+        )
     if len(facets) == 0 or len(g.shapes) > 1:
-        ctx.fail(16, "an envelope of triangles is wanted, this mesh holds {shapes}", at=at,
-                 shapes=" ".join(g.shapes) or "no element")
+        ctx.fail(
+            16,
+            "an envelope of triangles is wanted, this mesh holds {shapes}",
+            at=at,
+            shapes=" ".join(g.shapes) or "no element",
+        )
     return facets
 
 
-@extend("VOLUME").form(Arg("s", MAILLAGE, "closed envelope"), SIZE, Key("VERB", "accepted, says nothing more"),
-                       gives=[MAILLAGE], last=True)
+@extend("VOLUME").form(
+    Arg("s", MAILLAGE, "closed envelope"), SIZE, Key("VERB", "accepted, says nothing more"), gives=[MAILLAGE], last=True
+)
 def _volume(ctx: Context, s: Maillage, size: Size, verb: bool) -> Maillage:
     return fill_envelope(ctx, _envelope(ctx, s, "s"), size, "s")
 
 
-MAILLER = operator("MAILLER", topic="mesh", summary="mesh of the inside of an envelope or of a closed line", whole=True,
-                   notice="`M = MAILLER ENV (size)` fills a closed surface of triangles with tetrahedra; closed lines in the "
-                          "same plane are filled with triangles, or with quadrangles if 'ELEM' QUA4 asks for them. The "
-                          "boundary is kept as it is, node for node; closed parts inside the largest are cavities. The size "
-                          "inside follows the boundary, a FLOTTANT, or a CHPOINT on the boundary. The same data give the "
-                          "same mesh. Two bodies that touch: make the common face once, and use it and its copy "
-                          "`F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then pair exactly.",
-                   example="OPTI DIME 3 ELEM TRI3 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
-                           "V = S VOLU 2 'TRAN' (0. 0. 1.) ; E = CHAN TRI3 (ENVE V) ; M = MAILLER E ; MESS (MESU M) ;",
-                   see=["SURFACE", "VOLUME", "REMAILLER"])
+MAILLER = operator(
+    "MAILLER",
+    topic="mesh",
+    summary="mesh of the inside of an envelope or of a closed line",
+    whole=True,
+    notice="`M = MAILLER ENV (size)` fills a closed surface of triangles with tetrahedra; closed lines in the "
+    "same plane are filled with triangles, or with quadrangles if 'ELEM' QUA4 asks for them. The "
+    "boundary is kept as it is, node for node; closed parts inside the largest are cavities. The size "
+    "inside follows the boundary, a FLOTTANT, or a CHPOINT on the boundary. The same data give the "
+    "same mesh. Two bodies that touch: make the common face once, and use it and its copy "
+    "`F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then pair exactly.",
+    example="OPTI DIME 3 ELEM TRI3 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+    "V = S VOLU 2 'TRAN' (0. 0. 1.) ; E = CHAN TRI3 (ENVE V) ; M = MAILLER E ; MESS (MESU M) ;",
+    see=["SURFACE", "VOLUME", "REMAILLER"],
+)
 
 
-@MAILLER.form(Arg("g", MAILLAGE, "closed envelope, or closed lines"), SIZE,
-              Key("ELEM", "type of the elements", Arg("kind", "MOT")), gives=[MAILLAGE])
+@MAILLER.form(
+    Arg("g", MAILLAGE, "closed envelope, or closed lines"),
+    SIZE,
+    Key("ELEM", "type of the elements", Arg("kind", "MOT")),
+    gives=[MAILLAGE],
+)
 def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None) -> Maillage:
     flat = max((DIMENSION[name] for name in g.shapes), default=0) == 1
     kind = elem[:4] if elem is not None else ("TRI3" if flat else "TET4")
     if kind not in (("TRI3", "QUA4") if flat else ("TET4",)):
-        ctx.fail(19, "{kind} elements cannot fill this boundary", at="elem", kind=kind,
-                 hint="triangles (TRI3) or quadrangles (QUA4) fill lines, tetrahedra (TET4) fill surfaces")
+        ctx.fail(
+            19,
+            "{kind} elements cannot fill this boundary",
+            at="elem",
+            kind=kind,
+            hint="triangles (TRI3) or quadrangles (QUA4) fill lines, tetrahedra (TET4) fill surfaces",
+        )
     if flat:
         return fill_contour(ctx, _contour(ctx, g, "g"), size, kind == "QUA4", "g")
     return fill_envelope(ctx, _envelope(ctx, g, "g"), size, "g")

@@ -5,23 +5,27 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE, POINT
-
-from gibiane_ops.mesh.building import DIMENSION, dimension, explained, line_nodes, new_mesh, new_point, nodes_of
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.mesh.building import DIMENSION, dimension, explained, line_nodes, new_mesh, new_point, nodes_of
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.nodes import IntArray
 
-DENS = operator("DENSITE", topic="geometry", summary="size of the elements around the points made from now on",
-                notice="`DENS x ;` sets the current density, a length. Each new point keeps it, and lines between points "
-                       "are cut so that their elements have these sizes at the two ends (see DROIT). The same as "
-                       "OPTI DENS x.",
-                example="OPTI DIME 2 ELEM QUA4 ; DENS 0.25 ; L1 = DROIT (0. 0.) (1. 0.) ; MESS (NBEL L1) ;",
-                see=["OPTION", "DROIT"])
+DENS = operator(
+    "DENSITE",
+    topic="geometry",
+    summary="size of the elements around the points made from now on",
+    notice="`DENS x ;` sets the current density, a length. Each new point keeps it, and lines between points "
+    "are cut so that their elements have these sizes at the two ends (see DROIT). The same as "
+    "OPTI DENS x.",
+    example="OPTI DIME 2 ELEM QUA4 ; DENS 0.25 ; L1 = DROIT (0. 0.) (1. 0.) ; MESS (NBEL L1) ;",
+    see=["OPTION", "DROIT"],
+)
 
 
 @DENS.form(Arg("x", FLOTTANT, "size of the elements"))
@@ -31,12 +35,16 @@ def _dens(ctx: Context, x: float) -> None:
     ctx.session.options["DENS"] = x
 
 
-COOR = operator("COORDONNEE", topic="geometry", summary="coordinates of points, meshes and fields",
-                notice="`X = COOR 1 P` is the first coordinate of a point; `X Y Z = COOR P` gives all of them. Of a mesh "
-                       "or a CHPOINT, the result is a CHPOINT of component SCAL on its nodes. The number after the last "
-                       "coordinate is the density. `COOR L 'CURV'` is the distance along a line from its first point.",
-                example="OPTI DIME 2 ELEM SEG2 ; P = 3. 4. ; X Y = COOR P ; MESS X ' ' (COOR 2 P) ;",
-                see=["DIST", "NORM"])
+COOR = operator(
+    "COORDONNEE",
+    topic="geometry",
+    summary="coordinates of points, meshes and fields",
+    notice="`X = COOR 1 P` is the first coordinate of a point; `X Y Z = COOR P` gives all of them. Of a mesh "
+    "or a CHPOINT, the result is a CHPOINT of component SCAL on its nodes. The number after the last "
+    "coordinate is the density. `COOR L 'CURV'` is the distance along a line from its first point.",
+    example="OPTI DIME 2 ELEM SEG2 ; P = 3. 4. ; X Y = COOR P ; MESS X ' ' (COOR 2 P) ;",
+    see=["DIST", "NORM"],
+)
 
 
 def _scalar(ctx: Context, nodes: IntArray, values: Any) -> ChPoint:
@@ -46,8 +54,9 @@ def _scalar(ctx: Context, nodes: IntArray, values: Any) -> ChPoint:
 def _check_axis(ctx: Context, n: int) -> int:
     dim = dimension(ctx)
     if not 1 <= n <= dim + 1:
-        ctx.fail(36, "there is no coordinate {n}: 1 to {dim}, or {last} for the density", at="n", n=n, dim=dim,
-                 last=dim + 1)
+        ctx.fail(
+            36, "there is no coordinate {n}: 1 to {dim}, or {last} for the density", at="n", n=n, dim=dim, last=dim + 1
+        )
     return n - 1
 
 
@@ -58,8 +67,12 @@ def _coor_point(ctx: Context, p: Point, n: int | None) -> Any:
     return tuple(values[:dim]) if n is None else values[_check_axis(ctx, n)]
 
 
-@COOR.form(Arg("g", (MAILLAGE, CHPOINT), "mesh or nodal field"), Arg("n", ENTIER, "which", optional=True),
-           Key("CURV", "distance along a line"), gives=["CHPOINT..."])
+@COOR.form(
+    Arg("g", (MAILLAGE, CHPOINT), "mesh or nodal field"),
+    Arg("n", ENTIER, "which", optional=True),
+    Key("CURV", "distance along a line"),
+    gives=["CHPOINT..."],
+)
 def _coor_mesh(ctx: Context, g: Maillage | ChPoint, n: int | None, curv: bool) -> Any:
     dim = dimension(ctx)
     store = nodes_of(ctx)
@@ -78,9 +91,14 @@ def _coor_mesh(ctx: Context, g: Maillage | ChPoint, n: int | None, curv: bool) -
     return tuple(_scalar(ctx, nodes, table[:, axis]) for axis in range(dim))
 
 
-NORM = operator("NORM", topic="geometry", summary="length of a vector",
-                notice="A vector is a POINT: its distance to the origin.",
-                example="OPTI DIME 2 ; MESS (NORM (3. 4.)) ;", see=["DIST"])
+NORM = operator(
+    "NORM",
+    topic="geometry",
+    summary="length of a vector",
+    notice="A vector is a POINT: its distance to the origin.",
+    example="OPTI DIME 2 ; MESS (NORM (3. 4.)) ;",
+    see=["DIST"],
+)
 
 
 @NORM.form(Arg("v", POINT, "vector"), gives=[FLOTTANT])
@@ -88,9 +106,14 @@ def _norm(ctx: Context, v: Point) -> float:
     return float(np.linalg.norm(v.coords))
 
 
-DIST = operator("DIST", topic="geometry", summary="distance between two points, or two sets of points",
-                notice="Of two points, or of a point or mesh and a mesh: the smallest distance between their nodes.",
-                example="OPTI DIME 2 ; MESS (DIST (0. 0.) (3. 4.)) ;", see=["NORM"])
+DIST = operator(
+    "DIST",
+    topic="geometry",
+    summary="distance between two points, or two sets of points",
+    notice="Of two points, or of a point or mesh and a mesh: the smallest distance between their nodes.",
+    example="OPTI DIME 2 ; MESS (DIST (0. 0.) (3. 4.)) ;",
+    see=["NORM"],
+)
 
 
 @DIST.form(Arg("a", (POINT, MAILLAGE), "first"), Arg("b", (POINT, MAILLAGE), "second"), gives=[FLOTTANT])
@@ -106,10 +129,14 @@ def _dist(ctx: Context, a: Any, b: Any) -> float:
     return float(distance.min())
 
 
-BARY = operator("BARYCENTRE", topic="geometry", summary="mean point of the nodes of a mesh",
-                notice="The arithmetic mean of the nodes, in general not the centre of gravity. With 'ELEM': a mesh of "
-                       "points, one at the mean of the corners of each element.",
-                example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 4 (0. 0.) (2. 0.) ; X Y = COOR (BARY L) ; MESS X ;")
+BARY = operator(
+    "BARYCENTRE",
+    topic="geometry",
+    summary="mean point of the nodes of a mesh",
+    notice="The arithmetic mean of the nodes, in general not the centre of gravity. With 'ELEM': a mesh of "
+    "points, one at the mean of the corners of each element.",
+    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 4 (0. 0.) (2. 0.) ; X Y = COOR (BARY L) ; MESS X ;",
+)
 
 
 @BARY.form(Arg("g", MAILLAGE, "mesh"), Key("ELEM", "one point per element", name="each"), gives=["POINT|MAILLAGE"])
@@ -123,15 +150,23 @@ def _bary(ctx: Context, g: Maillage, each: bool) -> Point | Maillage:
     return new_point(ctx, store.coords[g.nodes].mean(axis=0))
 
 
-MESU = operator("MESURE", topic="geometry", summary="length, area or volume of a mesh",
-                notice="The measure of the elements of highest dimension in the mesh. On a closed line 'SURF' gives the "
-                       "area inside (projected on its mean plane), on a closed surface 'VOLU' the volume inside. 'DENS' "
-                       "gives a CHPOINT: the mean length of the edges around each node.",
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 2 (0. 0.) (3. 0.)) TRAN 2 (0. 2.) ; MESS (MESU S) ;")
+MESU = operator(
+    "MESURE",
+    topic="geometry",
+    summary="length, area or volume of a mesh",
+    notice="The measure of the elements of highest dimension in the mesh. On a closed line 'SURF' gives the "
+    "area inside (projected on its mean plane), on a closed surface 'VOLU' the volume inside. 'DENS' "
+    "gives a CHPOINT: the mean length of the edges around each node.",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 2 (0. 0.) (3. 0.)) TRAN 2 (0. 2.) ; MESS (MESU S) ;",
+)
 
 
-@MESU.form(Arg("g", MAILLAGE, "mesh"), Key(("LONG", "SURF", "VOLU"), "what to measure", name="what"),
-           Key("DENS", "lengths of the edges around nodes"), gives=["FLOTTANT|CHPOINT"])
+@MESU.form(
+    Arg("g", MAILLAGE, "mesh"),
+    Key(("LONG", "SURF", "VOLU"), "what to measure", name="what"),
+    Key("DENS", "lengths of the edges around nodes"),
+    gives=["FLOTTANT|CHPOINT"],
+)
 def _mesu(ctx: Context, g: Maillage, what: str | None, dens: bool) -> float | ChPoint:
     coords = nodes_of(ctx).coords
     if g.n_cells == 0:

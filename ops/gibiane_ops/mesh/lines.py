@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, FLOTTANT, LISTREEL, MAILLAGE, POINT
-
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.mesh import arcs, chains, edges, transforms
 from gibiane_ops.mesh.building import (
     DIMENSION,
     axis_end,
@@ -24,8 +26,6 @@ from gibiane_ops.mesh.building import (
     reference,
     reversed_mesh,
 )
-from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.mesh import arcs, chains, edges, transforms
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
 
@@ -60,23 +60,38 @@ def _build(ctx: Context, a: End, b: End | None, start: int, end: int, inner: Flo
     return join(parts)
 
 
-DROI = operator("DROIT", topic="mesh", summary="straight line between two points",
-                notice="`L = DROIT N P1 P2` makes N equal segments. Without N, the densities of the two points (or 'DINI' "
-                       "and 'DFIN') give the number and the sizes; with N negative, |N| segments of sizes that follow the "
-                       "densities. A line in place of P1 is prolonged from its last point; without P2 it is closed on its "
-                       "first point. D is another name of this operator.",
-                example="OPTI DIME 2 ELEM QUA4 ; L = DROIT 10 (0. 0.) (1. 0.) ; MESS (NBEL L) ;",
-                see=["CERCLE", "DALLER", "DENSITE"])
+DROI = operator(
+    "DROIT",
+    topic="mesh",
+    summary="straight line between two points",
+    notice="`L = DROIT N P1 P2` makes N equal segments. Without N, the densities of the two points (or 'DINI' "
+    "and 'DFIN') give the number and the sizes; with N negative, |N| segments of sizes that follow the "
+    "densities. A line in place of P1 is prolonged from its last point; without P2 it is closed on its "
+    "first point. D is another name of this operator.",
+    example="OPTI DIME 2 ELEM QUA4 ; L = DROIT 10 (0. 0.) (1. 0.) ; MESS (NBEL L) ;",
+    see=["CERCLE", "DALLER", "DENSITE"],
+)
 
 
-@DROI.form(COUNT, Arg("a", ENDS, "first point, or line to prolong"), Arg("b", ENDS, "last point", optional=True),
-           DINI, DFIN, gives=[MAILLAGE])
+@DROI.form(
+    COUNT,
+    Arg("a", ENDS, "first point, or line to prolong"),
+    Arg("b", ENDS, "last point", optional=True),
+    DINI,
+    DFIN,
+    gives=[MAILLAGE],
+)
 def _droit(ctx: Context, n: int | None, a: End, b: End | None, dini: float | None, dfin: float | None) -> Maillage:
     line_shape(ctx)
     start = _last(ctx, a, "a")
     if b is None and isinstance(a, Point):
-        ctx.fail(37, "no POINT for its other end", at="a", label="one end only",
-                 hint="in space a point needs three numbers, in parentheses: (0. 0. 1.)")
+        ctx.fail(
+            37,
+            "no POINT for its other end",
+            at="a",
+            label="one end only",
+            hint="in space a point needs three numbers, in parentheses: (0. 0. 1.)",
+        )
     end = _first(ctx, a if b is None else b, "b")
     store = nodes_of(ctx)
     x0, x1 = store.coords[start], store.coords[end]
@@ -85,19 +100,41 @@ def _droit(ctx: Context, n: int | None, a: End, b: End | None, dini: float | Non
     return _build(ctx, a, b, start, end, x0 + t[:, None] * (x1 - x0), d0 + t * (d1 - d0))
 
 
-CERC = operator("CERCLE", topic="mesh", summary="arc of a circle",
-                notice="`L = CERC N P1 C P2`: the shorter arc from P1 to P2 about the centre C (never half a circle). "
-                       "`CERC N 'PASS' P1 P2 P3`: through three points. `CERC N 'ROTA' angle P1 C (A)`: the path of P1 turned "
-                       "by an angle in degrees about C, or about the axis C-A in space; 'ELIM' closes a full turn. N, "
-                       "densities and lines in place of end points as in DROIT. C is another name of this operator.",
-                example="OPTI DIME 2 ELEM SEG2 ; L = CERC 8 (1. 0.) (0. 0.) (0. 1.) ; MESS (NBEL L) ;", see=["DROIT"])
+CERC = operator(
+    "CERCLE",
+    topic="mesh",
+    summary="arc of a circle",
+    notice="`L = CERC N P1 C P2`: the shorter arc from P1 to P2 about the centre C (never half a circle). "
+    "`CERC N 'PASS' P1 P2 P3`: through three points. `CERC N 'ROTA' angle P1 C (A)`: the path of P1 turned "
+    "by an angle in degrees about C, or about the axis C-A in space; 'ELIM' closes a full turn. N, "
+    "densities and lines in place of end points as in DROIT. C is another name of this operator.",
+    example="OPTI DIME 2 ELEM SEG2 ; L = CERC 8 (1. 0.) (0. 0.) (0. 1.) ; MESS (NBEL L) ;",
+    see=["DROIT"],
+)
 
 
-@CERC.form(COUNT, Key("ROTA", "turn the first point", Arg("angle", FLOTTANT, "degrees"), required=True),
-           Arg("a", ENDS, "first point"), Arg("c", POINT, "centre"), Arg("e", POINT, "second point of the axis", optional=True),
-           Key("ELIM", "close the circle"), DINI, DFIN, gives=[MAILLAGE])
-def _cercle_rota(ctx: Context, n: int | None, rota: float, a: End, c: Point, e: Point | None, elim: bool,
-                 dini: float | None, dfin: float | None) -> Maillage:
+@CERC.form(
+    COUNT,
+    Key("ROTA", "turn the first point", Arg("angle", FLOTTANT, "degrees"), required=True),
+    Arg("a", ENDS, "first point"),
+    Arg("c", POINT, "centre"),
+    Arg("e", POINT, "second point of the axis", optional=True),
+    Key("ELIM", "close the circle"),
+    DINI,
+    DFIN,
+    gives=[MAILLAGE],
+)
+def _cercle_rota(
+    ctx: Context,
+    n: int | None,
+    rota: float,
+    a: End,
+    c: Point,
+    e: Point | None,
+    elim: bool,
+    dini: float | None,
+    dfin: float | None,
+) -> Maillage:
     line_shape(ctx)
     if elim and abs(rota) != 360.0:
         ctx.fail(21, "'ELIM' closes a full turn only, not {angle} degrees", angle=rota)
@@ -117,11 +154,28 @@ def _cercle_rota(ctx: Context, n: int | None, rota: float, a: End, c: Point, e: 
     return _build(ctx, a, None, start, end, path[:-1], sizes[:-1])
 
 
-@CERC.form(COUNT, Key("PASS", "the second point is on the arc", name="through"), Key("CENTR", "it is the centre"),
-           Arg("a", ENDS, "first point"), Arg("c", POINT, "centre, or point of the arc"),
-           Arg("b", ENDS, "last point", optional=True), DINI, DFIN, gives=[MAILLAGE])
-def _cercle(ctx: Context, n: int | None, through: bool, centr: bool, a: End, c: Point, b: End | None,
-            dini: float | None, dfin: float | None) -> Maillage:
+@CERC.form(
+    COUNT,
+    Key("PASS", "the second point is on the arc", name="through"),
+    Key("CENTR", "it is the centre"),
+    Arg("a", ENDS, "first point"),
+    Arg("c", POINT, "centre, or point of the arc"),
+    Arg("b", ENDS, "last point", optional=True),
+    DINI,
+    DFIN,
+    gives=[MAILLAGE],
+)
+def _cercle(
+    ctx: Context,
+    n: int | None,
+    through: bool,
+    centr: bool,
+    a: End,
+    c: Point,
+    b: End | None,
+    dini: float | None,
+    dfin: float | None,
+) -> Maillage:
     line_shape(ctx)
     start, end = _last(ctx, a, "a"), _first(ctx, a if b is None else b, "b")
     store = nodes_of(ctx)
@@ -137,31 +191,50 @@ def _cercle(ctx: Context, n: int | None, through: bool, centr: bool, a: End, c: 
 def _through(ctx: Context, x0: FloatArray, middle: FloatArray, x1: FloatArray) -> arcs.Arc:
     arc = arcs.through(x0, middle, x1)
     if arc is None:
-        ctx.fail(21, "the three points are on one line: no circle passes through them", hint="DROIT makes a straight line")
+        ctx.fail(
+            21, "the three points are on one line: no circle passes through them", hint="DROIT makes a straight line"
+        )
     return arc
 
 
 def _about(ctx: Context, x0: FloatArray, centre: FloatArray, x1: FloatArray) -> arcs.Arc:
     r0, r1 = float(np.linalg.norm(x0 - centre)), float(np.linalg.norm(x1 - centre))
     if abs(r0 - r1) > 1e-3 * max(r0, r1) or r0 == 0:
-        ctx.fail(21, "the two ends are not at the same distance from the centre: {r0} and {r1}", r0=f"{r0:.6g}",
-                 r1=f"{r1:.6g}", hint="the operands are first point, centre, last point")
+        ctx.fail(
+            21,
+            "the two ends are not at the same distance from the centre: {r0} and {r1}",
+            r0=f"{r0:.6g}",
+            r1=f"{r1:.6g}",
+            hint="the operands are first point, centre, last point",
+        )
     arc = arcs.about(x0, centre, x1)
     if arc is None:
-        ctx.fail(30, "the two ends are opposite: half a circle can be drawn on either side",
-                 hint="make it of two arcs, or by CERC 'ROTA' 180.")
+        ctx.fail(
+            30,
+            "the two ends are opposite: half a circle can be drawn on either side",
+            hint="make it of two arcs, or by CERC 'ROTA' 180.",
+        )
     return arc
 
 
-QUEL = operator("QUELCONQUE", topic="mesh", summary="line through given points",
-                notice="`L = QUEL 'SEG2' P1 P2 P3 ...` joins points; a mesh of points (POI1) stands for its points in order. "
-                       "`QUEL 'SEG2' LX LY (LZ)` joins new points whose coordinates are lists.",
-                example="OPTI DIME 2 ; L = QUEL 'SEG2' (0. 0.) (1. 0.) (1. 1.) ; MESS (NBEL L) ;", see=["DROIT", "MANUEL"])
+QUEL = operator(
+    "QUELCONQUE",
+    topic="mesh",
+    summary="line through given points",
+    notice="`L = QUEL 'SEG2' P1 P2 P3 ...` joins points; a mesh of points (POI1) stands for its points in order. "
+    "`QUEL 'SEG2' LX LY (LZ)` joins new points whose coordinates are lists.",
+    example="OPTI DIME 2 ; L = QUEL 'SEG2' (0. 0.) (1. 0.) (1. 1.) ; MESS (NBEL L) ;",
+    see=["DROIT", "MANUEL"],
+)
 
 
-@QUEL.form(Key(("SEG2", "SEG3"), "type of elements", name="kind", required=True),
-           Arg("x", LISTREEL, "abscissas"), Arg("y", LISTREEL, "ordinates", optional=True),
-           Arg("z", LISTREEL, "third coordinates", optional=True), gives=[MAILLAGE])
+@QUEL.form(
+    Key(("SEG2", "SEG3"), "type of elements", name="kind", required=True),
+    Arg("x", LISTREEL, "abscissas"),
+    Arg("y", LISTREEL, "ordinates", optional=True),
+    Arg("z", LISTREEL, "third coordinates", optional=True),
+    gives=[MAILLAGE],
+)
 def _quel_lists(ctx: Context, kind: str, x: ListReel, y: ListReel | None, z: ListReel | None) -> Maillage:
     lists = [each.values for each in (x, y, z) if each is not None]
     dim = dimension(ctx)
@@ -172,8 +245,11 @@ def _quel_lists(ctx: Context, kind: str, x: ListReel, y: ListReel | None, z: Lis
     return _polyline(ctx, kind, nodes_of(ctx).add(np.column_stack(lists), ctx.option("DENS")))
 
 
-@QUEL.form(Key(("SEG2", "SEG3"), "type of elements", name="kind", required=True),
-           Arg("points", ENDS, "points, or meshes of points", many=True), gives=[MAILLAGE])
+@QUEL.form(
+    Key(("SEG2", "SEG3"), "type of elements", name="kind", required=True),
+    Arg("points", ENDS, "points, or meshes of points", many=True),
+    gives=[MAILLAGE],
+)
 def _quel(ctx: Context, kind: str, points: list[End]) -> Maillage:
     nodes = [np.array([p.node]) if isinstance(p, Point) else p.nodes_in_order() for p in points]
     return _polyline(ctx, kind, np.concatenate(nodes))
@@ -189,11 +265,15 @@ def _polyline(ctx: Context, kind: str, nodes: IntArray) -> Maillage:
     return line_between(ctx, nodes)
 
 
-INVE = operator("INVERSE", topic="mesh", summary="the same mesh turned over",
-                notice="Every element turns the other way round; a line is also read from its other end. Normals change "
-                       "side, and a volume gets negative jacobians (ORIE repairs them).",
-                example="OPTI DIME 2 ; L = INVE (DROIT 4 (0. 0.) (1. 0.)) ; X Y = COOR (L POIN 'INIT') ; MESS X ;",
-                see=["ORIENTER"])
+INVE = operator(
+    "INVERSE",
+    topic="mesh",
+    summary="the same mesh turned over",
+    notice="Every element turns the other way round; a line is also read from its other end. Normals change "
+    "side, and a volume gets negative jacobians (ORIE repairs them).",
+    example="OPTI DIME 2 ; L = INVE (DROIT 4 (0. 0.) (1. 0.)) ; X Y = COOR (L POIN 'INIT') ; MESS X ;",
+    see=["ORIENTER"],
+)
 
 
 @INVE.form(Arg("g", MAILLAGE, "mesh"), gives=[MAILLAGE])
@@ -201,33 +281,50 @@ def _inverse(ctx: Context, g: Maillage) -> Maillage:
     return reversed_mesh(g)
 
 
-CONT = operator("CONTOUR", topic="mesh", summary="boundary line of a surface",
-                notice="The edges that belong to one element only ('EXTE', the default), to three or more ('INTE'), or to "
-                       "any number but two ('TOUT'), oriented as the elements turn and in the order of a walk along "
-                       "them. An empty contour is an error unless 'NOID' is given.",
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL (CONT S)) ;",
-                see=["COTE", "ENVELOPPE"])
+CONT = operator(
+    "CONTOUR",
+    topic="mesh",
+    summary="boundary line of a surface",
+    notice="The edges that belong to one element only ('EXTE', the default), to three or more ('INTE'), or to "
+    "any number but two ('TOUT'), oriented as the elements turn and in the order of a walk along "
+    "them. An empty contour is an error unless 'NOID' is given.",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL (CONT S)) ;",
+    see=["COTE", "ENVELOPPE"],
+)
 
 
-@CONT.form(Arg("g", MAILLAGE, "surface"), Key(("EXTE", "INTE", "TOUT"), "which edges", name="which"),
-           Key("NOID", "an empty result is allowed"), gives=[MAILLAGE])
+@CONT.form(
+    Arg("g", MAILLAGE, "surface"),
+    Key(("EXTE", "INTE", "TOUT"), "which edges", name="which"),
+    Key("NOID", "an empty result is allowed"),
+    gives=[MAILLAGE],
+)
 def _contour(ctx: Context, g: Maillage, which: str | None, noid: bool) -> Maillage:
     surface = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 2]
     found = edges.contour(surface, which or "EXTE")
     if len(found) == 0:
         if noid:
             return new_mesh(ctx, [])
-        ctx.fail(26, "this mesh has no contour: it holds {shapes}", at="g", shapes=" ".join(g.shapes) or "no element",
-                 hint="a closed surface has none, and ENVE gives the boundary of a volume; 'NOID' accepts an empty result")
+        ctx.fail(
+            26,
+            "this mesh has no contour: it holds {shapes}",
+            at="g",
+            shapes=" ".join(g.shapes) or "no element",
+            hint="a closed surface has none, and ENVE gives the boundary of a volume; 'NOID' accepts an empty result",
+        )
     return new_mesh(ctx, [("SEG2", found[chains.walk(found)])])
 
 
-COTE = operator("COTE", topic="mesh", summary="sides of a surface",
-                notice="`L = COTE I S`: side 1 is the line that a surface was made from, 2 the right one, 3 the final one, 4 "
-                       "the left one, each directed along the contour. Without I, all of them: `L1 L2 L3 L4 = COTE S`. "
-                       "DALLER, TRAN, ROTA and REGLER record the sides.",
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL (COTE 2 S)) ;",
-                see=["CONTOUR", "FACE"])
+COTE = operator(
+    "COTE",
+    topic="mesh",
+    summary="sides of a surface",
+    notice="`L = COTE I S`: side 1 is the line that a surface was made from, 2 the right one, 3 the final one, 4 "
+    "the left one, each directed along the contour. Without I, all of them: `L1 L2 L3 L4 = COTE S`. "
+    "DALLER, TRAN, ROTA and REGLER record the sides.",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL (COTE 2 S)) ;",
+    see=["CONTOUR", "FACE"],
+)
 
 
 @COTE.form(Arg("g", MAILLAGE, "surface"), Arg("i", ENTIER, "which side", optional=True), gives=["MAILLAGE..."])

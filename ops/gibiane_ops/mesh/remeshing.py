@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, TABLE, Table, type_of
-
 from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.errors import MeshingFailed
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
@@ -18,17 +18,21 @@ from gibiane_ops.values.maillage import Maillage, Point
 
 SIMPLEX = {1: "POI1", 2: "SEG2", 3: "TRI3", 4: "TET4"}
 
-REMA = operator("REMAILLER", topic="mesh", summary="new mesh of the same domain with other sizes",
-                notice="`M2 = REMAILLER M1 size` meshes the domain of M1 (TET4 in space, TRI3 in the plane) again; size is a "
-                       "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse). Corners, "
-                       "plane faces and straight edges are kept exactly, curved faces follow the old facets. "
-                       "`M2 T2 = REMAILLER M1 size 'GROU' T1`: the MAILLAGE in the table T1 (parts of M1, of its boundary, of "
-                       "edges, points) are found again on M2 under the same indices. Index PAIRES of T1, a table of tables "
-                       "(1: face of the second body, 2: face of the first), names contact faces that are meshed once and "
-                       "duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning and M1 is returned.",
-                example="OPTI DIME 2 ELEM TRI3 ; C = CERC 16 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; S = SURF C 'PLAN' ; "
-                        "S2 = REMAILLER S 0.1 ; MESS ((NBEL S2) > (NBEL S)) ;",
-                see=["MAILLER", "TAILLE"])
+REMA = operator(
+    "REMAILLER",
+    topic="mesh",
+    summary="new mesh of the same domain with other sizes",
+    notice="`M2 = REMAILLER M1 size` meshes the domain of M1 (TET4 in space, TRI3 in the plane) again; size is a "
+    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse). Corners, "
+    "plane faces and straight edges are kept exactly, curved faces follow the old facets. "
+    "`M2 T2 = REMAILLER M1 size 'GROU' T1`: the MAILLAGE in the table T1 (parts of M1, of its boundary, of "
+    "edges, points) are found again on M2 under the same indices. Index PAIRES of T1, a table of tables "
+    "(1: face of the second body, 2: face of the first), names contact faces that are meshed once and "
+    "duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning and M1 is returned.",
+    example="OPTI DIME 2 ELEM TRI3 ; C = CERC 16 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; S = SURF C 'PLAN' ; "
+    "S2 = REMAILLER S 0.1 ; MESS ((NBEL S2) > (NBEL S)) ;",
+    see=["MAILLER", "TAILLE"],
+)
 
 SIZE = Arg("size", (FLOTTANT, CHPOINT), "edge length, or field of sizes")
 SOUC = Key("SOUCI", "a failure is a warning")
@@ -65,17 +69,29 @@ class Groups:
         elif isinstance(value, Maillage):
             block = value.single()
             if block is None or block.shape not in SIMPLEX.values():
-                self.ctx.fail(16, "the group {index} holds {shapes}: one of POI1, SEG2, TRI3, TET4 is wanted", at="grou",
-                              index=index, shapes=" ".join(value.shapes) or "no element")
+                self.ctx.fail(
+                    16,
+                    "the group {index} holds {shapes}: one of POI1, SEG2, TRI3, TET4 is wanted",
+                    at="grou",
+                    index=index,
+                    shapes=" ".join(value.shapes) or "no element",
+                )
             cells = block.cells
         else:
-            self.ctx.fail(39, "the group {index} is a {type}, not a MAILLAGE", at="grou", index=index, type=type_of(value))
+            self.ctx.fail(
+                39, "the group {index} is a {type}, not a MAILLAGE", at="grou", index=index, type=type_of(value)
+            )
         place = np.searchsorted(self.nodes, cells)
         place[place == len(self.nodes)] = 0
         if (self.nodes[place] != cells).any():
-            self.ctx.fail(21, "the group {index} is not a part of the mesh: {count} of its nodes are elsewhere", at="grou",
-                          index=index, count=len(np.setdiff1d(cells, self.nodes)),
-                          hint="a group made of other nodes at the same places is another mesh: ELIM makes them one")
+            self.ctx.fail(
+                21,
+                "the group {index} is not a part of the mesh: {count} of its nodes are elsewhere",
+                at="grou",
+                index=index,
+                count=len(np.setdiff1d(cells, self.nodes)),
+                hint="a group made of other nodes at the same places is another mesh: ELIM makes them one",
+            )
         self.keys[name] = index
         self.cells[name] = place
 
@@ -87,7 +103,9 @@ class Groups:
             for side in (1, 2):
                 face = pair.get(side) if isinstance(pair, Table) and pair.has(side) else None
                 if not isinstance(face, Maillage):
-                    self.ctx.fail(37, "the pair {index} has no MAILLAGE at index {side}", at="grou", index=index, side=side)
+                    self.ctx.fail(
+                        37, "the pair {index} has no MAILLAGE at index {side}", at="grou", index=index, side=side
+                    )
                 if id(face) not in values:
                     name = values[id(face)] = f"pair {index} {side}"
                     self._add(name, name, face)
@@ -117,23 +135,36 @@ class Groups:
         return table
 
 
-def _remesh(ctx: Context, g: Maillage, size: float | ChPoint, grou: Table | None, souci: bool) -> tuple[Maillage, Table]:
+def _remesh(
+    ctx: Context, g: Maillage, size: float | ChPoint, grou: Table | None, souci: bool
+) -> tuple[Maillage, Table]:
     from gibiane_ops.kernels.remesh import remesh
 
     dim = dimension(ctx)
     wanted = {2: "TRI3", 3: "TET4"}.get(dim)
     block = g.single()
     if block is None or block.shape != wanted:
-        ctx.fail(16, "a mesh of {wanted} is wanted, this one holds {shapes}", at="g", wanted=wanted,
-                 shapes=" ".join(g.shapes) or "no element", hint="CHAN {wanted} cuts other elements")
+        ctx.fail(
+            16,
+            "a mesh of {wanted} is wanted, this one holds {shapes}",
+            at="g",
+            wanted=wanted,
+            shapes=" ".join(g.shapes) or "no element",
+            hint="CHAN {wanted} cuts other elements",
+        )
     store = nodes_of(ctx)
     nodes = g.nodes
     sizes = sizes_at(ctx, size, nodes)
     groups = Groups(ctx, grou if grou is not None else Table(), nodes)
     with explained(ctx, "g"):
         try:
-            result = remesh(store.coords[nodes][:, :dim], np.searchsorted(nodes, block.cells),
-                            np.asarray(sizes, np.float64), groups=groups.cells, pairs=groups.pairs)
+            result = remesh(
+                store.coords[nodes][:, :dim],
+                np.searchsorted(nodes, block.cells),
+                np.asarray(sizes, np.float64),
+                groups=groups.cells,
+                pairs=groups.pairs,
+            )
         except MeshingFailed as failure:
             if not souci:
                 raise
@@ -146,8 +177,13 @@ def _remesh(ctx: Context, g: Maillage, size: float | ChPoint, grou: Table | None
     return new_mesh(ctx, [(wanted, ids[result.cells])]), groups.renewed(result.groups, ids)
 
 
-@REMA.form(Arg("g", MAILLAGE, "mesh"), SIZE, Key("GROUPES", "table of groups", Arg("t", TABLE), required=True, name="grou"),
-           SOUC, gives=[MAILLAGE, TABLE])
+@REMA.form(
+    Arg("g", MAILLAGE, "mesh"),
+    SIZE,
+    Key("GROUPES", "table of groups", Arg("t", TABLE), required=True, name="grou"),
+    SOUC,
+    gives=[MAILLAGE, TABLE],
+)
 def _with_groups(ctx: Context, g: Maillage, size: float | ChPoint, grou: Table, souci: bool) -> tuple[Maillage, Table]:
     return _remesh(ctx, g, size, grou, souci)
 

@@ -6,26 +6,30 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import ENTIER, FLOTTANT, LISTREEL, MAILLAGE, MOT, POINT
-
-from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, tolerance_of
+from gibiane.values import ENTIER, FLOTTANT, LISTMOTS, LISTREEL, MAILLAGE, MOT, POINT
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.mesh import distances
-from gibiane_ops.values.listes import ListReel
+from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, tolerance_of
+from gibiane_ops.values.listes import ListEnti, ListMots, ListReel
 from gibiane_ops.values.maillage import COLOURS, Block, Maillage, Point
 
-POIN = operator("POINT", topic="mesh", summary="make a point, or choose points of a mesh",
-                notice="`P = POIN x y z` makes a point, `POIN LX LY LZ` a mesh of points; 'DENS' gives their density. "
-                       "`G POIN N` is node N of a mesh of points or of a line, `G POIN i j` node i of element j, 'INIT' and "
-                       "'FINA' the ends of a line, 'PROC' P the node nearest to P: these are POINT. 'DROI' P1 P2, 'PLAN' P1 "
-                       "P2 P3, 'CYLI' A1 A2 P, 'CONE' S A P, 'SPHE' C P and 'TORE' C A C2 P give the mesh of the nodes on "
-                       "a line, a plane, a cylinder, a cone, a sphere or a torus, up to a distance that may follow (by "
-                       "default a tenth of the current density); 'JONC' those where more than two elements meet.",
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; "
-                        "B = S POIN 'DROI' (0. 0.) (1. 0.) 1.E-6 ; MESS (NBNO B) ;",
-                see=["ELEM", "COORDONNEE"])
+POIN = operator(
+    "POINT",
+    topic="mesh",
+    summary="make a point, or choose points of a mesh",
+    notice="`P = POIN x y z` makes a point, `POIN LX LY LZ` a mesh of points; 'DENS' gives their density. "
+    "`G POIN N` is node N of a mesh of points or of a line, `G POIN i j` node i of element j, 'INIT' and "
+    "'FINA' the ends of a line, 'PROC' P the node nearest to P: these are POINT. 'DROI' P1 P2, 'PLAN' P1 "
+    "P2 P3, 'CYLI' A1 A2 P, 'CONE' S A P, 'SPHE' C P and 'TORE' C A C2 P give the mesh of the nodes on "
+    "a line, a plane, a cylinder, a cone, a sphere or a torus, up to a distance that may follow (by "
+    "default a tenth of the current density); 'JONC' those where more than two elements meet.",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; "
+    "B = S POIN 'DROI' (0. 0.) (1. 0.) 1.E-6 ; MESS (NBNO B) ;",
+    see=["ELEM", "COORDONNEE"],
+)
 
 MESH = Arg("g", MAILLAGE, "mesh")
 TOLERANCE = Arg("tolerance", FLOTTANT, "distance", optional=True)
@@ -52,7 +56,9 @@ def _end(ctx: Context, g: Maillage, which: str) -> Point:
     _not_empty(ctx, g)
     block = g.single()
     if block is None or DIMENSION[block.shape] > 1:
-        ctx.fail(16, "a line or a mesh of points is wanted, this mesh holds {shapes}", at="g", shapes=" ".join(g.shapes))
+        ctx.fail(
+            16, "a line or a mesh of points is wanted, this mesh holds {shapes}", at="g", shapes=" ".join(g.shapes)
+        )
     return Point(g.store, block.cells[0, 0] if which == "INITIAL" else block.cells[-1, -1])
 
 
@@ -94,8 +100,13 @@ for _word, (_doc, _args, _distance) in ON.items():
 def _number(ctx: Context, g: Maillage, i: int, j: int | None) -> Point:
     block = g.single()
     if block is None:
-        ctx.fail(25, "a mesh of one element type is wanted, this one holds {shapes}", at="g",
-                 shapes=" ".join(g.shapes) or "no element", hint="CHAN POI1 G is the mesh of its points")
+        ctx.fail(
+            25,
+            "a mesh of one element type is wanted, this one holds {shapes}",
+            at="g",
+            shapes=" ".join(g.shapes) or "no element",
+            hint="CHAN POI1 G is the mesh of its points",
+        )
     if j is not None:
         column, row = i, j
     elif block.shape == "POI1":
@@ -104,17 +115,32 @@ def _number(ctx: Context, g: Maillage, i: int, j: int | None) -> Point:
         last = i == len(block.cells) + 1
         column, row = (2, i - 1) if last else (1, i)
     else:
-        ctx.fail(16, "node {number} of what? this mesh holds {shapes}", at="g", number=i, shapes=block.shape,
-                 hint="CHAN POI1 G is the mesh of its points; POIN i j is node i of element j")
+        ctx.fail(
+            16,
+            "node {number} of what? this mesh holds {shapes}",
+            at="g",
+            number=i,
+            shapes=block.shape,
+            hint="CHAN POI1 G is the mesh of its points; POIN i j is node i of element j",
+        )
     if not (1 <= row <= len(block.cells) and 1 <= column <= block.cells.shape[1]):
-        ctx.fail(18, "there is no such point: the mesh has {count} {shapes}", at="i", count=len(block.cells),
-                 shapes=block.shape)
+        ctx.fail(
+            18,
+            "there is no such point: the mesh has {count} {shapes}",
+            at="i",
+            count=len(block.cells),
+            shapes=block.shape,
+        )
     return Point(g.store, block.cells[row - 1, column - 1])
 
 
-@POIN.form(Arg("x", LISTREEL, "first coordinates"), Arg("y", LISTREEL, "second coordinates", optional=True),
-           Arg("z", LISTREEL, "third coordinates", optional=True), Key("DENS", "their density", Arg("d", (FLOTTANT, LISTREEL))),
-           gives=[MAILLAGE])
+@POIN.form(
+    Arg("x", LISTREEL, "first coordinates"),
+    Arg("y", LISTREEL, "second coordinates", optional=True),
+    Arg("z", LISTREEL, "third coordinates", optional=True),
+    Key("DENS", "their density", Arg("d", (FLOTTANT, LISTREEL))),
+    gives=[MAILLAGE],
+)
 def _make_many(ctx: Context, x: ListReel, y: ListReel | None, z: ListReel | None, dens: Any) -> Maillage:
     lists = [each.values for each in (x, y, z) if each is not None]
     _check_count(ctx, len(lists))
@@ -132,9 +158,14 @@ def _check_count(ctx: Context, given: int) -> None:
         ctx.fail(37, "{dim} coordinates are wanted, {given} are given", dim=dim, given=given)
 
 
-@POIN.form(Arg("x", FLOTTANT, "first coordinate"), Arg("y", FLOTTANT, "second coordinate", optional=True),
-           Arg("z", FLOTTANT, "third coordinate", optional=True), Key("DENS", "its density", Arg("d", FLOTTANT)),
-           gives=[POINT], last=True)
+@POIN.form(
+    Arg("x", FLOTTANT, "first coordinate"),
+    Arg("y", FLOTTANT, "second coordinate", optional=True),
+    Arg("z", FLOTTANT, "third coordinate", optional=True),
+    Key("DENS", "its density", Arg("d", FLOTTANT)),
+    gives=[POINT],
+    last=True,
+)
 def _make(ctx: Context, x: float, y: float | None, z: float | None, dens: float | None) -> Point:
     values = [each for each in (x, y, z) if each is not None]
     _check_count(ctx, len(values))
@@ -142,14 +173,28 @@ def _make(ctx: Context, x: float, y: float | None, z: float | None, dens: float 
     return Point(store, int(store.add([values], ctx.option("DENS") if dens is None else dens)[0]))
 
 
-NBEL = operator("NBEL", topic="mesh", summary="number of elements of a mesh", notice="An ENTIER.",
-                example="OPTI DIME 2 ; MESS (NBEL (DROIT 10 (0. 0.) (1. 0.))) ;", see=["NBNO"])
-NBNO = operator("NBNO", topic="mesh", summary="number of distinct nodes of a mesh", notice="An ENTIER.",
-                example="OPTI DIME 2 ; MESS (NBNO (DROIT 10 (0. 0.) (1. 0.))) ;", see=["NBEL"])
+NBEL = operator(
+    "NBEL",
+    topic="mesh",
+    summary="number of elements of a mesh",
+    notice="An ENTIER; with a LISTMOTS of types, a LISTENTI of the numbers of elements of each.",
+    example="OPTI DIME 2 ; MESS (NBEL (DROIT 10 (0. 0.) (1. 0.))) ;",
+    see=["NBNO"],
+)
+NBNO = operator(
+    "NBNO",
+    topic="mesh",
+    summary="number of distinct nodes of a mesh",
+    notice="An ENTIER.",
+    example="OPTI DIME 2 ; MESS (NBNO (DROIT 10 (0. 0.) (1. 0.))) ;",
+    see=["NBEL"],
+)
 
 
-@NBEL.form(MESH, gives=[ENTIER])
-def _nbel(ctx: Context, g: Maillage) -> int:
+@NBEL.form(MESH, Arg("types", LISTMOTS, "types of elements", optional=True), gives=["ENTIER|LISTENTI"])
+def _nbel(ctx: Context, g: Maillage, types: ListMots | None) -> int | ListEnti:
+    if types is not None:
+        return ListEnti([len(g.cells(name)) for name in types.words])
     return g.n_cells
 
 
@@ -158,19 +203,34 @@ def _nbno(ctx: Context, g: Maillage) -> int:
     return len(g.nodes)
 
 
-COUL = operator("COULEUR", topic="mesh", summary="the same mesh in a colour",
-                notice="A word (" + " ".join(COLOURS) + ") or its number from 1; without either, the colour of OPTI COUL.",
-                example="OPTI DIME 2 ELEM SEG2 ; L = (DROIT 2 (0. 0.) (1. 0.)) COUL ROUG ; LIST L ;", see=["ELEM"])
+COUL = operator(
+    "COULEUR",
+    topic="mesh",
+    summary="the same mesh in a colour",
+    notice="A word (" + " ".join(COLOURS) + ") or its number from 1; without either, the colour of OPTI COUL.",
+    example="OPTI DIME 2 ELEM SEG2 ; L = (DROIT 2 (0. 0.) (1. 0.)) COUL ROUG ; LIST L ;",
+    see=["ELEM"],
+)
 
 
-@COUL.form(MESH, Arg("number", ENTIER, "number of a colour", optional=True),
-           Arg("word", MOT, "name of a colour", optional=True), gives=[MAILLAGE])
+@COUL.form(
+    MESH,
+    Arg("number", ENTIER, "number of a colour", optional=True),
+    Arg("word", MOT, "name of a colour", optional=True),
+    gives=[MAILLAGE],
+)
 def _coul(ctx: Context, g: Maillage, number: int | None, word: str | None) -> Maillage:
     if word is not None:
         name = word[:4]
         if name not in COLOURS:
-            ctx.fail(1055, "there is no colour '{word}'", at="word", word=word, known=" ".join(COLOURS),
-                     hint="known colours: {known}")
+            ctx.fail(
+                1055,
+                "there is no colour '{word}'",
+                at="word",
+                word=word,
+                known=" ".join(COLOURS),
+                hint="known colours: {known}",
+            )
         index = COLOURS.index(name)
     elif number is not None:
         if number > len(COLOURS):

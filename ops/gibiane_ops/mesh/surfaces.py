@@ -6,10 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, FLOTTANT, MAILLAGE, POINT
-
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.mesh import arcs, chains, degenerate, project, sweep, transfinite, transforms
 from gibiane_ops.mesh.building import (
     DIMENSION,
     axis_end,
@@ -24,8 +26,6 @@ from gibiane_ops.mesh.building import (
     reversed_mesh,
     surface_shape,
 )
-from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.mesh import arcs, chains, degenerate, project, sweep, transfinite, transforms
 from gibiane_ops.values.maillage import Maillage, Point
 
 COUNT = Arg("n", ENTIER, "number of layers", optional=True)
@@ -40,14 +40,20 @@ def _start(ctx: Context, mesh: Maillage, at: str = "line", side: str = "3") -> t
         line_segments(ctx, mesh, at)
         return mesh, None
     if side not in mesh.sides:
-        ctx.fail(24, "this surface has no recorded side {number}", at=at, number=side,
-                 hint="give the line itself: CONT and ELEM 'COMP' extract it")
+        ctx.fail(
+            24,
+            "this surface has no recorded side {number}",
+            at=at,
+            number=side,
+            hint="give the line itself: CONT and ELEM 'COMP' extract it",
+        )
     edge = mesh.sides[side]
     return (reversed_mesh(edge) if side == "3" else edge), mesh
 
 
-def _end_sizes(ctx: Context, nodes: IntArray, dini: float | None, dfin: float | None,
-               far: float | None = None) -> tuple[float, float]:
+def _end_sizes(
+    ctx: Context, nodes: IntArray, dini: float | None, dfin: float | None, far: float | None = None
+) -> tuple[float, float]:
     """Return the sizes of the first and the last layer: given, or the densities at both ends of the sweep."""
     near = float(nodes_of(ctx).density[nodes].mean())
     return (near if dini is None else dini), ((near if far is None else far) if dfin is None else dfin)
@@ -61,8 +67,12 @@ def _sweep(ctx: Context, line: Maillage, layers: IntArray, base: IntArray, exten
     if not chains.is_chain(walked):
         return new_mesh(ctx, elements(ctx, cells))
     grid = layers[:, np.searchsorted(base, chains.chain_nodes(walked))]
-    sides = {"1": line, "2": line_between(ctx, grid[:, -1]), "3": line_between(ctx, grid[-1, ::-1]),
-             "4": line_between(ctx, grid[::-1, 0])}
+    sides = {
+        "1": line,
+        "2": line_between(ctx, grid[:, -1]),
+        "3": line_between(ctx, grid[-1, ::-1]),
+        "4": line_between(ctx, grid[::-1, 0]),
+    }
     surface = new_mesh(ctx, elements(ctx, cells), sides)
     if extended is None:
         return surface
@@ -80,8 +90,9 @@ def elements(ctx: Context, cells: IntArray) -> list[tuple[str, IntArray]]:
     return [("QUA4", quadrangles), ("TRI3", triangles)]
 
 
-def _layers(ctx: Context, base: IntArray, place: Callable[[float], FloatArray], places: FloatArray,
-            sizes: tuple[float, float]) -> IntArray:
+def _layers(
+    ctx: Context, base: IntArray, place: Callable[[float], FloatArray], places: FloatArray, sizes: tuple[float, float]
+) -> IntArray:
     """Add the nodes of the layers after the first; return all ids, (n_layers + 1, n_base)."""
     images = np.concatenate([place(float(t)) for t in places[1:]])
     density = np.repeat(sizes[0] + places[1:] * (sizes[1] - sizes[0]), len(base))
@@ -89,18 +100,23 @@ def _layers(ctx: Context, base: IntArray, place: Callable[[float], FloatArray], 
     return np.concatenate([base[None], new])
 
 
-TRAN = operator("TRANSLATION", topic="mesh", summary="surface swept by a line that is translated",
-                notice="`S = L TRAN N V` sweeps a line along the vector V in N layers; without N, or with N negative, the "
-                       "densities of the line (or 'DINI' and 'DFIN') give the layers, as in DROIT. The elements have the "
-                       "type of OPTI ELEM (QUA4 or TRI3). Sides 1 to 4 are recorded: see COTE. A surface in place of the "
-                       "line is prolonged from its side 3.",
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL S) ;",
-                see=["ROTA", "REGLER", "DALLER", "COTE"])
+TRAN = operator(
+    "TRANSLATION",
+    topic="mesh",
+    summary="surface swept by a line that is translated",
+    notice="`S = L TRAN N V` sweeps a line along the vector V in N layers; without N, or with N negative, the "
+    "densities of the line (or 'DINI' and 'DFIN') give the layers, as in DROIT. The elements have the "
+    "type of OPTI ELEM (QUA4 or TRI3). Sides 1 to 4 are recorded: see COTE. A surface in place of the "
+    "line is prolonged from its side 3.",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL S) ;",
+    see=["ROTA", "REGLER", "DALLER", "COTE"],
+)
 
 
 @TRAN.form(LINE, COUNT, DINI, DFIN, Arg("v", POINT, "vector"), gives=[MAILLAGE])
-def _translation(ctx: Context, line: Maillage, n: int | None, dini: float | None, dfin: float | None,
-                 v: Point) -> Maillage:
+def _translation(
+    ctx: Context, line: Maillage, n: int | None, dini: float | None, dfin: float | None, v: Point
+) -> Maillage:
     surface_shape(ctx)
     base, extended = _start(ctx, line)
     vector, nodes = v.coords, base.nodes
@@ -110,18 +126,38 @@ def _translation(ctx: Context, line: Maillage, n: int | None, dini: float | None
     return _sweep(ctx, base, _layers(ctx, nodes, lambda t: x + t * vector, places, sizes), nodes, extended)
 
 
-ROTA = operator("ROTATION", topic="mesh", summary="surface swept by a line that turns",
-                notice="`S = L ROTA N angle P1 (P2)` turns a line by an angle in degrees about P1 (in the plane) or the axis "
-                       "P1-P2. Layers, elements and sides as in TRAN; the length that counts is that of the mean path. "
-                       "Nodes on the axis are repeated: ELIM then REGE clean the result.",
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (1. 0.) (2. 0.)) ROTA 4 90. (0. 0.) ; MESS (NBEL S) ;",
-                see=["TRANSLATION", "TOUR", "ELIMINATION", "REGENERER"])
+ROTA = operator(
+    "ROTATION",
+    topic="mesh",
+    summary="surface swept by a line that turns",
+    notice="`S = L ROTA N angle P1 (P2)` turns a line by an angle in degrees about P1 (in the plane) or the axis "
+    "P1-P2. Layers, elements and sides as in TRAN; the length that counts is that of the mean path. "
+    "Nodes on the axis are repeated: ELIM then REGE clean the result.",
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (1. 0.) (2. 0.)) ROTA 4 90. (0. 0.) ; MESS (NBEL S) ;",
+    see=["TRANSLATION", "TOUR", "ELIMINATION", "REGENERER"],
+)
 
 
-@ROTA.form(LINE, COUNT, Arg("angle", FLOTTANT, "degrees"), DINI, DFIN, Arg("a", POINT, "centre"),
-           Arg("b", POINT, "second point of the axis", optional=True), gives=[MAILLAGE])
-def _rotation(ctx: Context, line: Maillage, n: int | None, angle: float, dini: float | None, dfin: float | None,
-              a: Point, b: Point | None) -> Maillage:
+@ROTA.form(
+    LINE,
+    COUNT,
+    Arg("angle", FLOTTANT, "degrees"),
+    DINI,
+    DFIN,
+    Arg("a", POINT, "centre"),
+    Arg("b", POINT, "second point of the axis", optional=True),
+    gives=[MAILLAGE],
+)
+def _rotation(
+    ctx: Context,
+    line: Maillage,
+    n: int | None,
+    angle: float,
+    dini: float | None,
+    dfin: float | None,
+    a: Point,
+    b: Point | None,
+) -> Maillage:
     surface_shape(ctx)
     base, extended = _start(ctx, line)
     axis, nodes = axis_end(ctx, a, b), base.nodes
@@ -134,26 +170,37 @@ def _rotation(ctx: Context, line: Maillage, n: int | None, angle: float, dini: f
     return _sweep(ctx, base, layers, nodes, extended)
 
 
-REGL = operator("REGLER", topic="mesh", summary="ruled surface between two lines",
-                notice="`S = L1 REGL N L2` joins two lines of the same number of elements, read in the same direction, by "
-                       "N layers on straight lines; N and densities as in TRAN. Sides 1 to 4 are recorded. A surface in "
-                       "place of L1 is prolonged from its side 3, one in place of L2 from its side 1.",
-                example="OPTI DIME 2 ELEM QUA4 ; L1 = DROIT 3 (0. 0.) (1. 0.) ; L2 = DROIT 3 (0. 1.) (2. 2.) ; "
-                        "S = L1 REGL 2 L2 ; MESS (NBEL S) ;",
-                see=["TRANSLATION", "DALLER"])
+REGL = operator(
+    "REGLER",
+    topic="mesh",
+    summary="ruled surface between two lines",
+    notice="`S = L1 REGL N L2` joins two lines of the same number of elements, read in the same direction, by "
+    "N layers on straight lines; N and densities as in TRAN. Sides 1 to 4 are recorded. A surface in "
+    "place of L1 is prolonged from its side 3, one in place of L2 from its side 1.",
+    example="OPTI DIME 2 ELEM QUA4 ; L1 = DROIT 3 (0. 0.) (1. 0.) ; L2 = DROIT 3 (0. 1.) (2. 2.) ; "
+    "S = L1 REGL 2 L2 ; MESS (NBEL S) ;",
+    see=["TRANSLATION", "DALLER"],
+)
 
 
 @REGL.form(LINE, COUNT, DINI, DFIN, Arg("last", MAILLAGE, "second line"), gives=[MAILLAGE])
-def _regler(ctx: Context, line: Maillage, n: int | None, dini: float | None, dfin: float | None,
-            last: Maillage) -> Maillage:
+def _regler(
+    ctx: Context, line: Maillage, n: int | None, dini: float | None, dfin: float | None, last: Maillage
+) -> Maillage:
     surface_shape(ctx)
     store = nodes_of(ctx)
     first, before = _start(ctx, line)
     second, after = _start(ctx, last, "last", "1")
     a, b = line_nodes(ctx, first, "line"), line_nodes(ctx, second, "last")
     if len(a) != len(b):
-        ctx.fail(33, "the two lines have {first} and {second} elements: as many are wanted", at="last",
-                 first=len(a) - 1, second=len(b) - 1, label="{second} elements")
+        ctx.fail(
+            33,
+            "the two lines have {first} and {second} elements: as many are wanted",
+            at="last",
+            first=len(a) - 1,
+            second=len(b) - 1,
+            label="{second} elements",
+        )
     x0, x1 = store.coords[a], store.coords[b]
     gap = np.linalg.norm(x1 - x0, axis=1)
     sizes = _end_sizes(ctx, a, dini, dfin, float(store.density[b].mean()))
@@ -166,23 +213,40 @@ def _regler(ctx: Context, line: Maillage, n: int | None, dini: float | None, dfi
     return _patch(ctx, grid, fixed, sizes, places, before, after)
 
 
-def _patch(ctx: Context, grid: FloatArray, ids: IntArray, sizes: tuple[float, float], places: FloatArray,
-           before: Maillage | None, after: Maillage | None) -> Maillage:
+def _patch(
+    ctx: Context,
+    grid: FloatArray,
+    ids: IntArray,
+    sizes: tuple[float, float],
+    places: FloatArray,
+    before: Maillage | None,
+    after: Maillage | None,
+) -> Maillage:
     """Make a surface of a grid: nodes of id -1 are added, -2 is the first of the row; surfaces come before and after."""
     new = ids == -1
     density = np.broadcast_to((sizes[0] + places * (sizes[1] - sizes[0]))[:, None], ids.shape)
     ids[new] = nodes_of(ctx).add(grid[new], density[new])
     seam = ids[:, -1] == -2
     ids[seam, -1] = ids[seam, 0]
-    sides = {"1": line_between(ctx, ids[0]), "2": line_between(ctx, ids[:, -1]),
-             "3": line_between(ctx, ids[-1][::-1]), "4": line_between(ctx, ids[::-1, 0])}
+    sides = {
+        "1": line_between(ctx, ids[0]),
+        "2": line_between(ctx, ids[:, -1]),
+        "3": line_between(ctx, ids[-1][::-1]),
+        "4": line_between(ctx, ids[::-1, 0]),
+    }
     surface = new_mesh(ctx, elements(ctx, _grid_cells(ids)), sides)
     parts = [part for part in (before, surface, after) if part is not None]
     if len(parts) == 1:
         return surface
-    return join(parts, {
-        "1": parts[0].sides["1"], "2": join([part.sides["2"] for part in parts]), "3": parts[-1].sides["3"],
-        "4": join([part.sides["4"] for part in reversed(parts)])})
+    return join(
+        parts,
+        {
+            "1": parts[0].sides["1"],
+            "2": join([part.sides["2"] for part in parts]),
+            "3": parts[-1].sides["3"],
+            "4": join([part.sides["4"] for part in reversed(parts)]),
+        },
+    )
 
 
 def _grid_cells(ids: IntArray) -> IntArray:
@@ -190,20 +254,28 @@ def _grid_cells(ids: IntArray) -> IntArray:
 
 
 SURFACES = ("PLAN", "QUEL", "SPHE", "CYLI", "CONI", "TORI")
-DALL = operator("DALLER", topic="mesh", summary="surface between four lines",
-                notice="`S = DALL L1 L2 L3 L4 'PLAN'` fills the contour made of four lines that follow one another; opposite "
-                       "lines have the same number of elements. 'SPHE' C, 'CYLI' P1 P2, 'CONI' S P put the nodes on a "
-                       "sphere, a cylinder or a cone, 'QUEL' leaves them where the lines say. Elements turn as the contour "
-                       "does; the four lines are the recorded sides.",
-                example="OPTI DIME 2 ELEM QUA4 ; P1 = 0. 0. ; P2 = 1. 0. ; P3 = 1. 1. ; P4 = 0. 1. ; "
-                        "S = DALL (DROIT 3 P1 P2) (DROIT 2 P2 P3) (DROIT 3 P3 P4) (DROIT 2 P4 P1) 'PLAN' ; MESS (NBEL S) ;",
-                see=["REGLER", "SURFACE", "COTE"])
+DALL = operator(
+    "DALLER",
+    topic="mesh",
+    summary="surface between four lines",
+    notice="`S = DALL L1 L2 L3 L4 'PLAN'` fills the contour made of four lines that follow one another; opposite "
+    "lines have the same number of elements. 'SPHE' C, 'CYLI' P1 P2, 'CONI' S P put the nodes on a "
+    "sphere, a cylinder or a cone, 'QUEL' leaves them where the lines say. Elements turn as the contour "
+    "does; the four lines are the recorded sides.",
+    example="OPTI DIME 2 ELEM QUA4 ; P1 = 0. 0. ; P2 = 1. 0. ; P3 = 1. 1. ; P4 = 0. 1. ; "
+    "S = DALL (DROIT 3 P1 P2) (DROIT 2 P2 P3) (DROIT 3 P3 P4) (DROIT 2 P4 P1) 'PLAN' ; MESS (NBEL S) ;",
+    see=["REGLER", "SURFACE", "COTE"],
+)
 
 
-@DALL.form(Arg("l1", MAILLAGE, "first side"), Arg("l2", MAILLAGE, "second side"), Arg("l3", MAILLAGE, "third side"),
-           Arg("l4", MAILLAGE, "fourth side"),
-           Key(SURFACES, "surface that holds the nodes", Arg("points", POINT, many=True, optional=True), name="on"),
-           gives=[MAILLAGE])
+@DALL.form(
+    Arg("l1", MAILLAGE, "first side"),
+    Arg("l2", MAILLAGE, "second side"),
+    Arg("l3", MAILLAGE, "third side"),
+    Arg("l4", MAILLAGE, "fourth side"),
+    Key(SURFACES, "surface that holds the nodes", Arg("points", POINT, many=True, optional=True), name="on"),
+    gives=[MAILLAGE],
+)
 def _daller(ctx: Context, l1: Maillage, l2: Maillage, l3: Maillage, l4: Maillage, on: Any) -> Maillage:
     surface_shape(ctx)
     store = nodes_of(ctx)
@@ -211,9 +283,15 @@ def _daller(ctx: Context, l1: Maillage, l2: Maillage, l3: Maillage, l4: Maillage
     bottom, right, top, left = _contour(ctx, lines)
     for first, second, name in ((bottom, top, "l3"), (right, left, "l4")):
         if len(first) != len(second):
-            ctx.fail(33, "opposite sides have {first} and {second} elements: as many are wanted", at=name,
-                     first=len(first) - 1, second=len(second) - 1, label="{second} elements",
-                     hint="SURF fills a contour whose sides differ")
+            ctx.fail(
+                33,
+                "opposite sides have {first} and {second} elements: as many are wanted",
+                at=name,
+                first=len(first) - 1,
+                second=len(second) - 1,
+                label="{second} elements",
+                hint="SURF fills a contour whose sides differ",
+            )
     top, left = top[::-1], left[::-1]
     x = store.coords
     grid = transfinite.patch(x[bottom], x[right], x[top], x[left])
@@ -235,12 +313,22 @@ def _contour(ctx: Context, lines: Sequence[IntArray]) -> list[IntArray]:
         if found[i][0] != found[i - 1][-1]:
             found[i] = found[i][::-1]
         if found[i][0] != found[i - 1][-1]:
-            ctx.fail(28, "the sides do not follow one another: side {number} does not begin where side {before} ends",
-                     at=f"l{i + 1}", number=i + 1, before=i, label="not joined to the side before it",
-                     hint="they must share their end points: the same POINT, or ELIM for points at one place")
+            ctx.fail(
+                28,
+                "the sides do not follow one another: side {number} does not begin where side {before} ends",
+                at=f"l{i + 1}",
+                number=i + 1,
+                before=i,
+                label="not joined to the side before it",
+                hint="they must share their end points: the same POINT, or ELIM for points at one place",
+            )
     if found[3][-1] != found[0][0]:
-        ctx.fail(28, "the contour is not closed: side 4 does not end where side 1 begins", at="l4",
-                 hint="they must share their end points: the same POINT, or ELIM for points at one place")
+        ctx.fail(
+            28,
+            "the contour is not closed: side 4 does not end where side 1 begins",
+            at="l4",
+            hint="they must share their end points: the same POINT, or ELIM for points at one place",
+        )
     return found
 
 
@@ -255,5 +343,8 @@ def _put_on(ctx: Context, kind: str, points: list[FloatArray], grid: FloatArray,
     flat = grid.reshape(-1, 3)
     with explained(ctx, "on"):
         put: dict[str, Callable[..., FloatArray]] = {
-            "SPHE": project.to_sphere, "CYLI": project.to_cylinder, "CONI": project.to_cone}
+            "SPHE": project.to_sphere,
+            "CYLI": project.to_cylinder,
+            "CONI": project.to_cone,
+        }
         return put[kind](flat, *points, corner).reshape(grid.shape)

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, MMODEL, POINT, TABLE, Table
-
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.mesh import transforms
@@ -24,22 +24,32 @@ OBJECTS = Arg("objects", (MAILLAGE, POINT, CHPOINT, MMODEL, MCHAML), "objects to
 TURNED = Arg("objects", (MAILLAGE, POINT, CHPOINT, MMODEL), "objects, then the points", many=True)
 SOLID = Arg("objects", (MAILLAGE, POINT, CHPOINT, MMODEL), "objects to move", many=True)
 
-SEVERAL = ("Several objects give as many results; nodes that they share stay shared. The nodes are new: ELIM joins them "
-           "to those of other meshes.")
+SEVERAL = (
+    "Several objects give as many results; nodes that they share stay shared. The nodes are new: ELIM joins them "
+    "to those of other meshes."
+)
 
-PLUS = operator("PLUS", topic="mesh", summary="moved copies of objects",
-                notice="`G2 = G1 PLUS V` translates points, meshes, fields and models by a vector; with a CHPOINT in place "
-                       "of V each node moves by its values UX UY UZ (0 where it has none). A TABLE gives a table of its "
-                       "moved objects. " + SEVERAL,
-                example="OPTI DIME 2 ELEM SEG2 ; L1 = DROIT 2 (0. 0.) (1. 0.) ; L2 = L1 PLUS (0. 3.) ; "
-                        "X Y = COOR (L2 POIN 'FINA') ; MESS X ' ' Y ;",
-                see=["MOINS", "TOUR", "SYMETRIE", "DEPLACER"])
-MOIN = operator("MOINS", topic="mesh", summary="copies of objects moved back, or the field that leads from one mesh to another",
-                notice="As PLUS with the opposite vector or field. `CH = G2 MOIN G1`, two meshes made alike: the CHPOINT on "
-                       "G1 that moves it onto G2. " + SEVERAL,
-                example="OPTI DIME 2 ELEM SEG2 ; L1 = DROIT 2 (0. 0.) (1. 0.) ; L2 = L1 PLUS (0. 3.) ; "
-                        "CH = L2 MOIN L1 ; MESS (MAXI CH) ;",
-                see=["PLUS"])
+PLUS = operator(
+    "PLUS",
+    topic="mesh",
+    summary="moved copies of objects",
+    notice="`G2 = G1 PLUS V` translates points, meshes, fields and models by a vector; with a CHPOINT in place "
+    "of V each node moves by its values UX UY UZ (0 where it has none). A TABLE gives a table of its "
+    "moved objects. " + SEVERAL,
+    example="OPTI DIME 2 ELEM SEG2 ; L1 = DROIT 2 (0. 0.) (1. 0.) ; L2 = L1 PLUS (0. 3.) ; "
+    "X Y = COOR (L2 POIN 'FINA') ; MESS X ' ' Y ;",
+    see=["MOINS", "TOUR", "SYMETRIE", "DEPLACER"],
+)
+MOIN = operator(
+    "MOINS",
+    topic="mesh",
+    summary="copies of objects moved back, or the field that leads from one mesh to another",
+    notice="As PLUS with the opposite vector or field. `CH = G2 MOIN G1`, two meshes made alike: the CHPOINT on "
+    "G1 that moves it onto G2. " + SEVERAL,
+    example="OPTI DIME 2 ELEM SEG2 ; L1 = DROIT 2 (0. 0.) (1. 0.) ; L2 = L1 PLUS (0. 3.) ; "
+    "CH = L2 MOIN L1 ; MESS (MAXI CH) ;",
+    see=["PLUS"],
+)
 
 
 def _shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[[FloatArray, Any], FloatArray]:
@@ -48,8 +58,12 @@ def _shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[
         vector = sign * by.coords
         return lambda x, nodes: np.asarray(x + vector, np.float64)
     if not isinstance(by, ChPoint):
-        ctx.fail(37, "no POINT or CHPOINT that says by how much to move", at=at,
-                 hint="the last operand is the vector: G PLUS (0. 0. 1.)")
+        ctx.fail(
+            37,
+            "no POINT or CHPOINT that says by how much to move",
+            at=at,
+            hint="the last operand is the vector: G PLUS (0. 0. 1.)",
+        )
     names = next((n for n in DISPLACEMENTS.values() if set(n) & set(by.names)), DISPLACEMENTS["TRID"])
 
     def move(x: FloatArray, nodes: Any) -> FloatArray:
@@ -70,7 +84,9 @@ def _translated(ctx: Context, objects: list[Any], sign: float) -> Any:
 def _moved_table(ctx: Context, t: Table, by: Point | ChPoint, sign: float) -> Table:
     keys = [key for key, _ in t.entries.values() if key != "SOUSTYPE"]
     result = t.copy()
-    for key, value in zip(keys, Copier(ctx, [t.get(key) for key in keys], _shift(ctx, by, sign)).results(), strict=True):
+    for key, value in zip(
+        keys, Copier(ctx, [t.get(key) for key in keys], _shift(ctx, by, sign)).results(), strict=True
+    ):
         result.set(key, value)
     return result
 
@@ -99,8 +115,14 @@ def _moins_table(ctx: Context, t: Table, v: Any) -> Table:
 
 def _difference(ctx: Context, end: Maillage, start: Maillage) -> ChPoint:
     if [(b.shape, b.cells.shape) for b in end.blocks] != [(b.shape, b.cells.shape) for b in start.blocks]:
-        ctx.fail(21, "the two meshes are not made alike: {end} and {start} elements", at="objects", end=end.n_cells,
-                 start=start.n_cells, hint="one must be a moved copy of the other, or made by the same operations")
+        ctx.fail(
+            21,
+            "the two meshes are not made alike: {end} and {start} elements",
+            at="objects",
+            end=end.n_cells,
+            start=start.n_cells,
+            hint="one must be a moved copy of the other, or made by the same operations",
+        )
     first, last = (np.concatenate([b.cells.ravel() for b in g.blocks]) for g in (start, end))
     nodes, row = np.unique(first, return_index=True)
     x = nodes_of(ctx).coords
@@ -136,12 +158,16 @@ def _rotation(ctx: Context, angle: float, points: Sequence[Point]) -> Affine:
     return _affine(ctx, lambda: transforms.rotation(angle, points[0].coords, axis))
 
 
-TOUR = operator("TOUR", topic="mesh", summary="copies of objects turned about a point or an axis",
-                notice="`G2 = G1 TOUR angle P1 (P2)`: degrees, about P1 in the plane, about the axis P1-P2 in space. The "
-                       "components of displacements, forces, rotations and moments of a CHPOINT turn too. " + SEVERAL,
-                example="OPTI DIME 2 ELEM SEG2 ; L2 = (DROIT 2 (1. 0.) (2. 0.)) TOUR 90. (0. 0.) ; "
-                        "X Y = COOR (L2 POIN 'FINA') ; MESS X ' ' Y ;",
-                see=["PLUS", "SYMETRIE", "ROTATION"])
+TOUR = operator(
+    "TOUR",
+    topic="mesh",
+    summary="copies of objects turned about a point or an axis",
+    notice="`G2 = G1 TOUR angle P1 (P2)`: degrees, about P1 in the plane, about the axis P1-P2 in space. The "
+    "components of displacements, forces, rotations and moments of a CHPOINT turn too. " + SEVERAL,
+    example="OPTI DIME 2 ELEM SEG2 ; L2 = (DROIT 2 (1. 0.) (2. 0.)) TOUR 90. (0. 0.) ; "
+    "X Y = COOR (L2 POIN 'FINA') ; MESS X ' ' Y ;",
+    see=["PLUS", "SYMETRIE", "ROTATION"],
+)
 
 
 @TOUR.form(Arg("angle", FLOTTANT, "degrees"), TURNED, gives=["same types..."])
@@ -151,13 +177,17 @@ def _tour(ctx: Context, angle: float, objects: list[Any]) -> Any:
 
 
 P, P1, P2, P3 = (Arg(name, POINT) for name in ("p", "p1", "p2", "p3"))
-SYME = operator("SYMETRIE", topic="mesh", summary="mirror images of objects",
-                notice="About a point ('POIN' P), a line ('DROI' P1 P2: a reflection in the plane, a half turn in space) or a "
-                       "plane ('PLAN' P1 P2 P3). Surfaces and volumes are turned over where the symmetry exchanges left and "
-                       "right, so that volumes stay positive and normals stay outside. " + SEVERAL,
-                example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 2 (1. 0.) (2. 0.)) TRAN 2 (0. 1.) ; "
-                        "S2 = S SYME 'DROI' (0. 0.) (0. 1.) ; MESS (MESU S2) ;",
-                see=["PLUS", "TOUR", "HOMOTHETIE"])
+SYME = operator(
+    "SYMETRIE",
+    topic="mesh",
+    summary="mirror images of objects",
+    notice="About a point ('POIN' P), a line ('DROI' P1 P2: a reflection in the plane, a half turn in space) or a "
+    "plane ('PLAN' P1 P2 P3). Surfaces and volumes are turned over where the symmetry exchanges left and "
+    "right, so that volumes stay positive and normals stay outside. " + SEVERAL,
+    example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 2 (1. 0.) (2. 0.)) TRAN 2 (0. 1.) ; "
+    "S2 = S SYME 'DROI' (0. 0.) (0. 1.) ; MESS (MESU S2) ;",
+    see=["PLUS", "TOUR", "HOMOTHETIE"],
+)
 
 
 @SYME.form(SOLID, Key("POINT", "about a point", P, required=True), gives=["same types..."])
@@ -177,15 +207,23 @@ def _syme_plane(ctx: Context, objects: list[Any], plan: tuple[Point, Point, Poin
     return _copies(ctx, objects, _affine(ctx, lambda: transforms.symmetry_plane(a.coords, b.coords, c.coords)))
 
 
-HOMO = operator("HOMOTHETIE", topic="mesh", summary="copies of objects made larger or smaller about a point",
-                notice="`G2 = G1 HOMO ratio P`. " + SEVERAL,
-                example="OPTI DIME 2 ELEM SEG2 ; L = (DROIT 2 (1. 0.) (2. 0.)) HOMO 3. (0. 0.) ; MESS (MESU L) ;",
-                see=["AFFINITE", "SYMETRIE"])
-AFFI = operator("AFFINITE", topic="mesh", summary="copies of objects stretched along a direction",
-                notice="`G2 = G1 AFFI ratio P1 P2`: distances to P1 along the direction P1-P2 are multiplied by the ratio. "
-                       + SEVERAL,
-                example="OPTI DIME 2 ELEM SEG2 ; L = (DROIT 2 (1. 0.) (2. 0.)) AFFI 3. (0. 0.) (1. 0.) ; MESS (MESU L) ;",
-                see=["HOMOTHETIE"])
+HOMO = operator(
+    "HOMOTHETIE",
+    topic="mesh",
+    summary="copies of objects made larger or smaller about a point",
+    notice="`G2 = G1 HOMO ratio P`. " + SEVERAL,
+    example="OPTI DIME 2 ELEM SEG2 ; L = (DROIT 2 (1. 0.) (2. 0.)) HOMO 3. (0. 0.) ; MESS (MESU L) ;",
+    see=["AFFINITE", "SYMETRIE"],
+)
+AFFI = operator(
+    "AFFINITE",
+    topic="mesh",
+    summary="copies of objects stretched along a direction",
+    notice="`G2 = G1 AFFI ratio P1 P2`: distances to P1 along the direction P1-P2 are multiplied by the ratio. "
+    + SEVERAL,
+    example="OPTI DIME 2 ELEM SEG2 ; L = (DROIT 2 (1. 0.) (2. 0.)) AFFI 3. (0. 0.) (1. 0.) ; MESS (MESU L) ;",
+    see=["HOMOTHETIE"],
+)
 
 
 @HOMO.form(Arg("ratio", FLOTTANT, "ratio"), TURNED, gives=["same types..."])
@@ -200,13 +238,16 @@ def _affi(ctx: Context, ratio: float, objects: list[Any]) -> Any:
     return _copies(ctx, kept, _affine(ctx, lambda: transforms.affinity(ratio, a.coords, b.coords)))
 
 
-DEPL = operator("DEPLACER", topic="mesh", summary="move the nodes of a mesh or a point, in place",
-                notice="`DEPL G 'PLUS' V ;`, 'MOIN' V, 'TOUR' angle P1 (P2), 'HOMO' ratio P, 'AFFI' ratio P1 P2, 'SYME' then "
-                       "'POIN' P, 'DROI' P1 P2 or 'PLAN' P1 P2 P3: as the operators of these names, but the nodes of G "
-                       "themselves move, and every object that shares them with it. V may be a CHPOINT.",
-                example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (1. 0.) (2. 0.) ; DEPL L 'PLUS' (0. 5.) ; "
-                        "MESS (MINI (COOR 2 L)) ;",
-                see=["PLUS", "TOUR"])
+DEPL = operator(
+    "DEPLACER",
+    topic="mesh",
+    summary="move the nodes of a mesh or a point, in place",
+    notice="`DEPL G 'PLUS' V ;`, 'MOIN' V, 'TOUR' angle P1 (P2), 'HOMO' ratio P, 'AFFI' ratio P1 P2, 'SYME' then "
+    "'POIN' P, 'DROI' P1 P2 or 'PLAN' P1 P2 P3: as the operators of these names, but the nodes of G "
+    "themselves move, and every object that shares them with it. V may be a CHPOINT.",
+    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (1. 0.) (2. 0.) ; DEPL L 'PLUS' (0. 5.) ; MESS (MINI (COOR 2 L)) ;",
+    see=["PLUS", "TOUR"],
+)
 WHAT = Arg("g", (MAILLAGE, POINT), "what to move")
 BY = Arg("v", (POINT, CHPOINT), "vector or field")
 
@@ -240,10 +281,21 @@ def _depl_affi(ctx: Context, g: Maillage | Point, affi: tuple[float, Point, Poin
     _move(ctx, g, lambda x, nodes: motion(x))
 
 
-@DEPL.form(WHAT, Key("SYME", "mirror", required=True), Key("POINT", "about a point", P),
-           Key("DROIT", "about a line", P1, P2), Key("PLAN", "about a plane", P1, P2, P3))
-def _depl_syme(ctx: Context, g: Maillage | Point, syme: bool, point: Point | None, droit: tuple[Point, Point] | None,
-               plan: tuple[Point, Point, Point] | None) -> None:
+@DEPL.form(
+    WHAT,
+    Key("SYME", "mirror", required=True),
+    Key("POINT", "about a point", P),
+    Key("DROIT", "about a line", P1, P2),
+    Key("PLAN", "about a plane", P1, P2, P3),
+)
+def _depl_syme(
+    ctx: Context,
+    g: Maillage | Point,
+    syme: bool,
+    point: Point | None,
+    droit: tuple[Point, Point] | None,
+    plan: tuple[Point, Point, Point] | None,
+) -> None:
     def make() -> Affine:
         if point is not None:
             return transforms.symmetry_point(point.coords, dimension(ctx) < 3)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gibiane.forms import Arg
 from gibiane.registry import Context, extend, operator
 from gibiane.values import ENTIER, FLOTTANT, POINT
-
 from gibiane_ops.mesh.building import dimension, new_point
 from gibiane_ops.values.maillage import Point
 
 NUMBER = (ENTIER, FLOTTANT)
 
-PVEC = operator("PVECTORIEL", topic="geometry", summary="vector product of two vectors",
-                notice="Of two POINT taken as vectors, in space. In the plane, of one vector: the same turned by 90 degrees.",
-                example="OPTI DIME 3 ; X Y Z = COOR (PVEC (1. 0. 0.) (0. 1. 0.)) ; MESS Z ;", see=["PSCAL"])
+PVEC = operator(
+    "PVECTORIEL",
+    topic="geometry",
+    summary="vector product of two vectors",
+    notice="Of two POINT taken as vectors, in space. In the plane, of one vector: the same turned by 90 degrees.",
+    example="OPTI DIME 3 ; X Y Z = COOR (PVEC (1. 0. 0.) (0. 1. 0.)) ; MESS Z ;",
+    see=["PSCAL"],
+)
 
 
 @extend("PSCAL").form(Arg("u", POINT, "vector"), Arg("v", POINT, "vector"), gives=[FLOTTANT])

@@ -6,10 +6,14 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, FLOTTANT, LISTREEL, MAILLAGE, POINT
-
+from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.mesh import arcs, orientation, sweep, transforms
 from gibiane_ops.mesh.building import (
     DIMENSION,
     SURFACES,
@@ -24,24 +28,24 @@ from gibiane_ops.mesh.building import (
     reference,
     reversed_mesh,
 )
-from gibiane_ops.kernels import geometry, topology
-from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.mesh import arcs, orientation, sweep, transforms
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
 
-VOLU = operator("VOLUME", topic="mesh", summary="volume swept by a surface, or inside an envelope",
-                notice="`V = S VOLU N 'TRAN' VEC` sweeps a surface along a vector in N layers, `S VOLU N 'ROTA' angle P1 P2` "
-                       "turns it about an axis (degrees), `S VOLU N 'GENE' L` moves it along a line, and `S1 VOLU N S2` "
-                       "joins two surfaces that are meshed alike. Quadrangles give CUB8, triangles PRI6. Without N or "
-                       "with N negative, densities (or 'DINI' and 'DFIN') give the layers, as in DROIT; 'PROG' with a "
-                       "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
-                       "volume in place of S is prolonged from its face 2. `V = ENV VOLU` alone fills a closed envelope "
-                       "of triangles with tetrahedra.",
-                example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
-                        "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL V) ;",
-                see=["FACE", "ENVELOPPE", "TRANSLATION", "MAILLER"])
+VOLU = operator(
+    "VOLUME",
+    topic="mesh",
+    summary="volume swept by a surface, or inside an envelope",
+    notice="`V = S VOLU N 'TRAN' VEC` sweeps a surface along a vector in N layers, `S VOLU N 'ROTA' angle P1 P2` "
+    "turns it about an axis (degrees), `S VOLU N 'GENE' L` moves it along a line, and `S1 VOLU N S2` "
+    "joins two surfaces that are meshed alike. Quadrangles give CUB8, triangles PRI6. Without N or "
+    "with N negative, densities (or 'DINI' and 'DFIN') give the layers, as in DROIT; 'PROG' with a "
+    "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
+    "volume in place of S is prolonged from its face 2. `V = ENV VOLU` alone fills a closed envelope "
+    "of triangles with tetrahedra.",
+    example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+    "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL V) ;",
+    see=["FACE", "ENVELOPPE", "TRANSLATION", "MAILLER"],
+)
 
 BASE = Arg("s", MAILLAGE, "surface, or volume to prolong from its face 2")
 COUNT = Arg("n", ENTIER, "number of layers", optional=True)
@@ -57,14 +61,21 @@ def _base(ctx: Context, mesh: Maillage, at: str, face: str) -> tuple[Maillage, M
     if mesh.shapes and all(name in SURFACES for name in mesh.shapes):
         return mesh, None
     if not any(DIMENSION[name] == 3 for name in mesh.shapes):
-        ctx.fail(16, "a surface is wanted, this mesh holds {shapes}", at=at, shapes=" ".join(mesh.shapes) or "no element",
-                 label="holds {shapes}")
+        ctx.fail(
+            16,
+            "a surface is wanted, this mesh holds {shapes}",
+            at=at,
+            shapes=" ".join(mesh.shapes) or "no element",
+            label="holds {shapes}",
+        )
     if face not in mesh.sides:
         ctx.fail(24, "this volume has no recorded face {number} to prolong", at=at, number=face)
     return mesh.sides[face], mesh
 
 
-def _places(ctx: Context, length: float, sizes: tuple[float, float], n: int | None, prog: ListReel | None) -> FloatArray:
+def _places(
+    ctx: Context, length: float, sizes: tuple[float, float], n: int | None, prog: ListReel | None
+) -> FloatArray:
     if prog is None:
         return places_along(ctx, length, *sizes, n)
     values = prog.values
@@ -73,15 +84,23 @@ def _places(ctx: Context, length: float, sizes: tuple[float, float], n: int | No
     return np.asarray((values - values[0]) / (values[-1] - values[0]), np.float64)
 
 
-def _sizes(ctx: Context, nodes: IntArray, dini: float | None, dfin: float | None,
-           far: float | None = None) -> tuple[float, float]:
+def _sizes(
+    ctx: Context, nodes: IntArray, dini: float | None, dfin: float | None, far: float | None = None
+) -> tuple[float, float]:
     near = float(nodes_of(ctx).density[nodes].mean())
     return (near if dini is None else dini), ((near if far is None else far) if dfin is None else dfin)
 
 
-def _sweep(ctx: Context, surface: Maillage, place: Callable[[float], FloatArray], places: FloatArray,
-           sizes: tuple[float, float], extended: Maillage | None, end: IntArray | None = None,
-           after: Maillage | None = None) -> Maillage:
+def _sweep(
+    ctx: Context,
+    surface: Maillage,
+    place: Callable[[float], FloatArray],
+    places: FloatArray,
+    sizes: tuple[float, float],
+    extended: Maillage | None,
+    end: IntArray | None = None,
+    after: Maillage | None = None,
+) -> Maillage:
     """Make the volume between the images of a surface; `end` gives the nodes of the last image if they exist."""
     store, base = nodes_of(ctx), surface.nodes
     inner = places[1:] if end is None else places[1:-1]
@@ -132,10 +151,12 @@ def _around(blocks: list[tuple[str, IntArray]], ids: IntArray) -> list[tuple[str
     return [("QUA4", found.nodes[at.min(axis=1) != at.max(axis=1)])]
 
 
-@VOLU.form(BASE, COUNT, DINI, DFIN, PROG, Key("TRAN", "translate", Arg("v", POINT, "vector"), required=True),
-           gives=[MAILLAGE])
-def _translated(ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None,
-                tran: Point) -> Maillage:
+@VOLU.form(
+    BASE, COUNT, DINI, DFIN, PROG, Key("TRAN", "translate", Arg("v", POINT, "vector"), required=True), gives=[MAILLAGE]
+)
+def _translated(
+    ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None, tran: Point
+) -> Maillage:
     surface, extended = _base(ctx, s, "s", "2")
     vector, nodes = tran.coords, surface.nodes
     sizes = _sizes(ctx, nodes, dini, dfin, float(tran.store.density[tran.node]) or None)
@@ -144,10 +165,31 @@ def _translated(ctx: Context, s: Maillage, n: int | None, dini: float | None, df
     return _sweep(ctx, surface, lambda t: x + t * vector, places, sizes, extended)
 
 
-@VOLU.form(BASE, COUNT, DINI, DFIN, PROG, Key("ROTA", "turn", Arg("angle", FLOTTANT, "degrees"), Arg("a", POINT, "axis"),
-                                              Arg("b", POINT, "axis"), required=True), gives=[MAILLAGE])
-def _rotated(ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None,
-             rota: tuple[float, Point, Point]) -> Maillage:
+@VOLU.form(
+    BASE,
+    COUNT,
+    DINI,
+    DFIN,
+    PROG,
+    Key(
+        "ROTA",
+        "turn",
+        Arg("angle", FLOTTANT, "degrees"),
+        Arg("a", POINT, "axis"),
+        Arg("b", POINT, "axis"),
+        required=True,
+    ),
+    gives=[MAILLAGE],
+)
+def _rotated(
+    ctx: Context,
+    s: Maillage,
+    n: int | None,
+    dini: float | None,
+    dfin: float | None,
+    prog: ListReel | None,
+    rota: tuple[float, Point, Point],
+) -> Maillage:
     surface, extended = _base(ctx, s, "s", "2")
     angle, a, b = rota
     axis, nodes = axis_end(ctx, a, b), surface.nodes
@@ -169,9 +211,18 @@ def _generated(ctx: Context, s: Maillage, gene: Maillage) -> Maillage:
     return _sweep(ctx, surface, lambda t: x + path[round(t)], rank, (density, density), extended)
 
 
-@VOLU.form(BASE, COUNT, DINI, DFIN, PROG, Arg("last", MAILLAGE, "second surface, meshed like the first"), gives=[MAILLAGE])
-def _ruled(ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None,
-           last: Maillage) -> Maillage:
+@VOLU.form(
+    BASE, COUNT, DINI, DFIN, PROG, Arg("last", MAILLAGE, "second surface, meshed like the first"), gives=[MAILLAGE]
+)
+def _ruled(
+    ctx: Context,
+    s: Maillage,
+    n: int | None,
+    dini: float | None,
+    dfin: float | None,
+    prog: ListReel | None,
+    last: Maillage,
+) -> Maillage:
     first, extended = _base(ctx, s, "s", "2")
     second, after = _base(ctx, last, "last", "1")
     store, base = nodes_of(ctx), first.nodes
@@ -193,18 +244,28 @@ def _matching(ctx: Context, first: Maillage, second: Maillage, base: IntArray) -
         end[one] = two
         if (end[one] == two).all() and len(np.unique(end)) == len(end):
             return end
-    ctx.fail(35, "the two surfaces are not meshed alike: {first} and {second} elements", at="last",
-             first=first.n_cells, second=second.n_cells, label="not the image of the first surface",
-             hint="make the second surface from the first, with PLUS, TOUR or DEPL")
+    ctx.fail(
+        35,
+        "the two surfaces are not meshed alike: {first} and {second} elements",
+        at="last",
+        first=first.n_cells,
+        second=second.n_cells,
+        label="not the image of the first surface",
+        hint="make the second surface from the first, with PLUS, TOUR or DEPL",
+    )
 
 
-FACE = operator("FACE", topic="mesh", summary="faces of a swept volume",
-                notice="`S = FACE I V`: face 1 is the one that the volume was swept from, 2 the opposite one, 3 the rest of "
-                       "the boundary. Without I, all of them: `S1 S2 S3 = FACE V`. The normals of the facets leave the "
-                       "volume.",
-                example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
-                        "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL (FACE 3 V)) ;",
-                see=["VOLUME", "ENVELOPPE", "COTE"])
+FACE = operator(
+    "FACE",
+    topic="mesh",
+    summary="faces of a swept volume",
+    notice="`S = FACE I V`: face 1 is the one that the volume was swept from, 2 the opposite one, 3 the rest of "
+    "the boundary. Without I, all of them: `S1 S2 S3 = FACE V`. The normals of the facets leave the "
+    "volume.",
+    example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+    "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL (FACE 3 V)) ;",
+    see=["VOLUME", "ENVELOPPE", "COTE"],
+)
 
 
 @FACE.form(Arg("g", MAILLAGE, "volume"), Arg("i", ENTIER, "which face", optional=True), gives=["MAILLAGE..."])
@@ -212,21 +273,34 @@ def _face(ctx: Context, g: Maillage, i: int | None) -> Any:
     return reference(ctx, g, i, "face")
 
 
-ENVE = operator("ENVELOPPE", topic="mesh", summary="boundary surface of a volume",
-                notice="The facets that belong to one element only, with normals that leave the volume, or enter it with "
-                       "'ORIE'. An empty envelope is an error unless 'NOID' is given.",
-                example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
-                        "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL (ENVE V)) ;",
-                see=["FACE", "CONTOUR"])
+ENVE = operator(
+    "ENVELOPPE",
+    topic="mesh",
+    summary="boundary surface of a volume",
+    notice="The facets that belong to one element only, with normals that leave the volume, or enter it with "
+    "'ORIE'. An empty envelope is an error unless 'NOID' is given.",
+    example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
+    "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL (ENVE V)) ;",
+    see=["FACE", "CONTOUR"],
+)
 
 
-@ENVE.form(Arg("g", MAILLAGE, "volume"), Key("ORIE", "normals into the volume"), Key("NOID", "an empty result is allowed"),
-           gives=[MAILLAGE])
+@ENVE.form(
+    Arg("g", MAILLAGE, "volume"),
+    Key("ORIE", "normals into the volume"),
+    Key("NOID", "an empty result is allowed"),
+    gives=[MAILLAGE],
+)
 def _enveloppe(ctx: Context, g: Maillage, orie: bool, noid: bool) -> Maillage:
     solids = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 3]
     found = topology.boundary(solids) if solids else {}
     if not found and not noid:
-        ctx.fail(26, "this mesh has no envelope: it holds {shapes}", at="g", shapes=" ".join(g.shapes) or "no element",
-                 hint="CONT gives the boundary of a surface; 'NOID' accepts an empty result")
+        ctx.fail(
+            26,
+            "this mesh has no envelope: it holds {shapes}",
+            at="g",
+            shapes=" ".join(g.shapes) or "no element",
+            hint="CONT gives the boundary of a surface; 'NOID' accepts an empty result",
+        )
     skin = new_mesh(ctx, [(name, facets.nodes) for name, facets in found.items()])
     return reversed_mesh(skin) if orie else skin

@@ -50,8 +50,8 @@ def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray
     return np.asarray(xi, np.float64)
 
 
-def _in_reference(name: str, xi: FloatArray, tolerance: float | FloatArray) -> BoolArray:
-    """Tell which reference points are in the reference element, up to a tolerance (one, or one per point)."""
+def _in_reference(name: str, xi: FloatArray, tolerance: float) -> BoolArray:
+    """Tell which reference points are in the reference element, up to a tolerance."""
     kind = shape(name)
     below, beyond = kind.ref_nodes.min(axis=0) - xi, xi - kind.ref_nodes.max(axis=0)
     inside = np.maximum(below, beyond).max(axis=1) <= tolerance
@@ -92,36 +92,41 @@ def containing(name: str, X: FloatArray, x: FloatArray, tolerance: float = 1e-9)
     return near[_in_reference(name, xi, tolerance) & on].astype(np.int64)
 
 
-def in_polygon(points: FloatArray, polygon: FloatArray, tolerance: float = 0.0) -> BoolArray:
-    """Tell which points of the plane are inside a closed polygon.
+def in_contours(points: FloatArray, a: FloatArray, b: FloatArray) -> tuple[BoolArray, BoolArray]:
+    """Tell which points of the plane are inside closed contours, and which are on them.
 
     Parameters
     ----------
     points : (k, 2) float64, length
-    polygon : (n + 1, 2) float64, length
-        The last point is the first.
-    tolerance : float, length
-        Points at most this far outside count as inside.
+    a, b : (n, 2) float64, length
+        Ends of the segments of closed contours, in any order and direction; contours inside others are holes.
 
     Returns
     -------
-    (k,) bool
-        By the parity of crossings; on the boundary, inside.
+    inside : (k,) bool
+        By the parity of crossings.
+    on : (k,) bool
+        Up to round-off; `inside` means nothing there.
+
+    Cost
+    ----
+    The product of the numbers of points and segments.
     """
-    a, b = polygon[:-1], polygon[1:]
-    inside = np.zeros(len(points), bool)
-    for start in range(0, len(points), 4096):
-        p = points[start : start + 4096, None, :]
+    inside, on = np.zeros(len(points), bool), np.zeros(len(points), bool)
+    along = b - a
+    square = np.maximum((along * along).sum(axis=1), 1e-300)
+    height = np.where(along[:, 1] == 0, 1.0, along[:, 1])
+    scale = 1e-9 * float(np.abs(np.concatenate([a, b]) - a[0]).max())
+    step = max(1, 2_000_000 // max(len(a), 1))
+    for start in range(0, len(points), step):
+        p = points[start : start + step, None, :]
         above = (a[:, 1] > p[..., 1]) != (b[:, 1] > p[..., 1])
-        height = np.where(b[:, 1] == a[:, 1], 1.0, b[:, 1] - a[:, 1])
-        crossing = a[:, 0] + (p[..., 1] - a[:, 1]) * (b[:, 0] - a[:, 0]) / height
-        odd = (above & (p[..., 0] < crossing)).sum(axis=1) % 2 == 1
-        along = b - a
-        t = np.clip(((p - a) * along).sum(axis=2) / np.maximum((along * along).sum(axis=1), 1e-300), 0.0, 1.0)
+        crossing = a[:, 0] + (p[..., 1] - a[:, 1]) * along[:, 0] / height
+        inside[start : start + step] = (above & (p[..., 0] < crossing)).sum(axis=1) % 2 == 1
+        t = np.clip(((p - a) * along).sum(axis=2) / square, 0.0, 1.0)
         distance = np.linalg.norm(p - a - t[..., None] * along, axis=2).min(axis=1)
-        scale = 1e-12 * float(np.abs(polygon).max())
-        inside[start : start + 4096] = odd | (distance <= max(tolerance, scale))
-    return inside
+        on[start : start + step] = distance <= scale
+    return inside, on
 
 
 def in_mesh(points: FloatArray, coords: FloatArray, blocks: Sequence[Block], tolerance: float = 0.0) -> BoolArray:
@@ -133,8 +138,9 @@ def in_mesh(points: FloatArray, coords: FloatArray, blocks: Sequence[Block], tol
     coords : (n_points, dim) float64, length
         Nodes of the mesh.
     blocks : sequence of (str, (m, n_nodes) int64)
-    tolerance : float, length
-        Points at most about this far outside an element count as inside it.
+    tolerance : float
+        In reference coordinates: points slightly outside an element are caught by a positive one, points near its
+        faces are left out by a negative one.
 
     Returns
     -------
@@ -154,13 +160,12 @@ def in_mesh(points: FloatArray, coords: FloatArray, blocks: Sequence[Block], tol
         X = coords[cells]
         centre = X.mean(axis=1)
         radius = np.linalg.norm(X - centre[:, None], axis=2).max(axis=1)
-        found = tree.query_ball_point(centre, radius * (1 + 1e-9) + tolerance)
+        found = tree.query_ball_point(centre, radius * (1 + 2 * max(tolerance, 1e-9)))
         count = np.array([len(each) for each in found])
         if not count.any():
             continue
         row = np.repeat(np.arange(len(cells)), count)
         point = np.concatenate([np.asarray(each, np.int64) for each in found if len(each)])
         xi = reference_coordinates(name, X[row], points[point])
-        margin = np.maximum(1e-9, tolerance / radius[row])
-        inside[point[_in_reference(name, xi, margin)]] = True
+        inside[point[_in_reference(name, xi, tolerance)]] = True
     return inside

@@ -49,9 +49,7 @@ def patch(bottom: FloatArray, right: FloatArray, top: FloatArray, left: FloatArr
     v = (v0 + u0 * dv) / (1.0 - du * dv)
     u, v = u[..., None], v[..., None]
     ruled = (1 - v) * bottom[None] + v * top[None] + (1 - u) * left[:, None] + u * right[:, None]
-    corners = (
-        (1 - u) * (1 - v) * bottom[0] + u * (1 - v) * bottom[-1] + (1 - u) * v * top[0] + u * v * top[-1]
-    )
+    corners = (1 - u) * (1 - v) * bottom[0] + u * (1 - v) * bottom[-1] + (1 - u) * v * top[0] + u * v * top[-1]
     grid: FloatArray = ruled - corners
     grid[0], grid[-1], grid[:, 0], grid[:, -1] = bottom, top, left, right
     return grid
