@@ -77,7 +77,13 @@ def _dispatch(arguments: list[str]) -> int:
     if command.startswith("-"):
         raise _Usage(f"unknown option {command}")
     session = _session(options, operands)
-    return _finish(session, session.run_file(command))
+    code = session.run_file(command)
+    if session.handed_over and sys.stdin.isatty():  # OPTI DONN 5 ;
+        from gibiane.repl import run
+
+        session.interactive = True
+        return run(session)
+    return _finish(session, code)
 
 
 def _stdin() -> str:

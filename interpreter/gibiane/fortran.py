@@ -48,7 +48,12 @@ _DESCRIPTOR = re.compile(
 
 
 class BadFormat(Exception):
-    """A FORMAT descriptor that cannot be used, and why."""
+    """A FORMAT descriptor that cannot be used, and why (a sentence with its fields)."""
+
+    def __init__(self, template: str, **fields: str) -> None:
+        super().__init__(template)
+        self.template = template
+        self.fields = fields
 
 
 class Format:
@@ -57,7 +62,7 @@ class Format:
     def __init__(self, text: str) -> None:
         inner = text.strip()
         if not (inner.startswith("(") and inner.endswith(")")):
-            raise BadFormat(f"a format stands between parentheses: ({inner})")
+            raise BadFormat("a format stands between parentheses: ({inner})", inner=inner)
         found = _DESCRIPTOR.match(inner[1:-1].replace(" ", ""))
         if found is None:
             raise BadFormat("known descriptors: Fw.d Ew.d Dw.d ESw.d Gw.d Iw Aw, with 1P and SP before them")
@@ -83,6 +88,14 @@ class Format:
         if self.plus and not text.strip().startswith("-") and math.isfinite(x):
             text = _fit("+" + text.strip(), self.width)
         return text
+
+    def integer(self, n: int) -> str:
+        """Return the image of an integer: by `Iw`, else as short as it is."""
+        return _fit(str(n), self.width) if self.kind == "I" else str(n)
+
+    def word(self, word: str) -> str:
+        """Return the image of a word: by `Aw` cut or padded on the left, else as it is."""
+        return word[: self.width].rjust(self.width) if self.kind == "A" and self.width else word
 
     def _plain(self, x: float) -> str:
         if not math.isfinite(x):

@@ -13,6 +13,10 @@ class Stop(Exception):
     """The run ends here: FIN."""
 
 
+class Resume(Exception):
+    """Reading goes on elsewhere: OPTI DONN 3 in a file that another one reads, OPTI DONN 5 in a script."""
+
+
 class Loop:
     """An active REPE block."""
 

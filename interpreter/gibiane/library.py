@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from gibiane.source import SourceText, decode
+from gibiane.diagnostics import error, nearest
+from gibiane.source import NotText, SourceText, decode
 
 
 def shipped() -> Path | None:
@@ -72,3 +73,37 @@ def _read(path: Path) -> SourceText:
     except ValueError:
         shown = path
     return SourceText(shown.as_posix(), decode(path.read_bytes()), str(path.parent))
+
+
+def read_script(path: Path) -> SourceText:
+    """Read a script file.
+
+    Raises
+    ------
+    GibianeError
+        1130 when it cannot be opened, G101 when it is no text.
+    """
+    try:
+        data = path.read_bytes()
+    except IsADirectoryError:
+        raise error(1130, "{path} is a folder, not a script", path=path.as_posix()) from None
+    except OSError as failure:
+        close = _similar_file(path)
+        raise error(1130, "the script {path} cannot be opened ({reason})", path=path.as_posix(),
+                    reason=(failure.strerror or "cannot be read").lower(), close=close,
+                    hint="did you mean {close}?" if close else None) from None
+    try:
+        return SourceText(path.as_posix(), decode(data), str(path.parent))
+    except NotText as failure:
+        raise error("G101", "{path} is not a text file (a NUL byte at offset {offset})", path=path.as_posix(),
+                    offset=failure.offset) from None
+
+
+def _similar_file(path: Path) -> str | None:
+    if not path.parent.is_dir():
+        return None
+    names = [p.name for p in path.parent.iterdir() if p.is_file()]
+    close = nearest(path.name, names, 3)
+    if close is None and path.name + ".dgibi" in names:
+        close = path.name + ".dgibi"
+    return (path.parent / close).as_posix() if close else None

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from gibiane.evaluator import Evaluator
 
 MAX_DEPTH = 500
+ECHO_PROCEDURES = 2  # the level of OPTI ECHO that shows the lines of procedure files
 
 
 def _word(node: Node) -> str | None:
@@ -83,9 +84,22 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
     source = ev.session.library.find(word)
     if source is None:
         return None
+    program = define_all(ev, source)
+    found = ev.session.globals.names.get(word[:24])
+    if not isinstance(found, Procedure):
+        raise GibianeError(make(1031, "{file} does not define the procedure {name}", file=source.name, name=word,
+                                span=program[0].span() if program else None,
+                                hint="the name after DEBP must be the name of the file"))
+    return found
+
+
+def define_all(ev: Evaluator, source: SourceText) -> list[Instr]:
+    """Define every procedure of a file in the session; return the instructions of the file."""
     program = parse(source)
     slips.mark(source, program)
     annotate(program)
+    if ev.session.options["ECHO"] >= ECHO_PROCEDURES:
+        ev.echo(source, 1, source.locate(len(source.text.rstrip()))[0])
     outer, ev.frame = ev.frame, ev.session.globals
     try:
         pc = 0
@@ -98,12 +112,7 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
             pc = define(ev, program, pc)
     finally:
         ev.frame = outer
-    found = ev.session.globals.names.get(word[:24])
-    if not isinstance(found, Procedure):
-        raise GibianeError(make(1031, "{file} does not define the procedure {name}", file=source.name, name=word,
-                                span=program[0].span() if program else None,
-                                hint="the name after DEBP must be the name of the file"))
-    return found
+    return program
 
 
 def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:

@@ -10,16 +10,19 @@ from typing import Any, TextIO
 
 from gibiane import registry, slips
 from gibiane.blocks import annotate
-from gibiane.diagnostics import ERROR, Diagnostic, GibianeError, make, render
+from gibiane.diagnostics import ERROR, Diagnostic, GibianeError, error, make, render
 from gibiane.evaluator import Evaluator
-from gibiane.frames import Frame, Stop
-from gibiane.library import Library
-from gibiane.source import NotText, SourceText, Span, decode
+from gibiane.frames import Frame, Resume, Stop
+from gibiane.library import Library, read_script
+from gibiane.nodes import Instr
+from gibiane.source import SourceText, Span
 from gibiane.syntax import parse
 from gibiane.values import Value, type_of
 
 EXIT_CODES = {0: 0, 1: 4, 2: 8, 3: 12}
 INTERNAL_FAILURE, INTERRUPTED = 70, 130
+KEYBOARD = 5  # the unit that OPTI DONN 5 reads
+MAX_INCLUDED = 50
 # 500 nested calls of procedures take a dozen Python calls each
 RECURSION_LIMIT = 12_000
 
@@ -59,6 +62,9 @@ class Session:
         self.worst = 0
         self.internal = False
         self.finished = False
+        self.handed_over = False
+        self.pending: list[str | int] = []
+        self._included = 0
         self.started = time.perf_counter()
         self._ordinals: dict[int, tuple[int, Any]] = {}
         self.evaluator = Evaluator(self)
@@ -155,29 +161,14 @@ class Session:
 
     def open(self, path: str | Path) -> SourceText | None:
         """Read a script file; a missing or unreadable one is a diagnostic and None."""
-        path = Path(path)
         try:
-            data = path.read_bytes()
-        except IsADirectoryError:
-            self.emit(make(1130, "{path} is a folder, not a script", path=path.as_posix()))
-            return None
-        except OSError as failure:
-            close = _similar_file(path)
-            reason = failure.strerror or "cannot be read"
-            self.emit(make(1130, "the script {path} cannot be opened ({reason})", path=path.as_posix(),
-                           reason=reason.lower(), hint="did you mean {close}?" if close else None, close=close))
-            return None
-        try:
-            return SourceText(path.as_posix(), decode(data), str(path.parent))
-        except NotText as failure:
-            self.emit(make("G101", "{path} is not a text file (a NUL byte at offset {offset})", path=path.as_posix(),
-                           offset=failure.offset))
+            return read_script(Path(path))
+        except GibianeError as failure:
+            self.emit(failure.diagnostic)
             return None
 
     def _run(self, source: SourceText) -> int:
-        program = parse(source)
-        slips.mark(source, program)
-        annotate(program)
+        program = _program(source)
         previous = self.library.directory
         if source.directory is not None:
             self.library.directory = source.directory
@@ -187,8 +178,11 @@ class Session:
             self.evaluator.run(program)
         except Stop:
             self.finished = True
+        except Resume:
+            pass
         except GibianeError as failure:
             self.emit(failure.diagnostic)
+            self.finished = self.options["ERRE"] == "FATA"
         except RecursionError:
             self.emit(make("G103", "calls or parentheses are nested too deeply"))
         except KeyboardInterrupt:
@@ -204,6 +198,34 @@ class Session:
             self.evaluator.unwind()
             self.out.flush()
         return INTERNAL_FAILURE if self.internal else EXIT_CODES[self.worst]
+
+    def switch_input(self, source: str | int, span: Span) -> None:
+        """Do what OPTI DONN asks: read the instructions of a file now, or leave what is being read.
+
+        A file's end, or `OPTI DONN 3` in it, goes back to the instruction after the one that named it.
+        `OPTI DONN 5` hands over to the keyboard: a script that is not read at a prompt ends there.
+        """
+        if isinstance(source, int):
+            self.handed_over = source == KEYBOARD
+            if self._included or (self.handed_over and not self.interactive):
+                raise Resume
+            return
+        path = Path(source)
+        beside = Path(self.library.directory or "") / source
+        text = read_script(beside if not path.is_file() and beside.is_file() else path)
+        if self._included >= MAX_INCLUDED:
+            raise error("G103", "files are read one inside another more than {limit} deep", limit=MAX_INCLUDED)
+        self._included += 1
+        try:
+            self.evaluator.run(_program(text))
+        except Resume:
+            if self.handed_over:
+                raise
+        except GibianeError as failure:
+            failure.diagnostic.trace.append(("OPTI DONN", span))
+            raise
+        finally:
+            self._included -= 1
 
     def _internal(self, failure: Exception) -> None:
         """Turn an unforeseen Python error into G900: the user gets a sentence, --debug the traceback."""
@@ -238,6 +260,14 @@ def _value(text: str) -> Any:
     return text
 
 
+def _program(source: SourceText) -> list[Instr]:
+    """Parse a text, look for slips in it, match its blocks."""
+    program = parse(source)
+    slips.mark(source, program)
+    annotate(program)
+    return program
+
+
 def load_operators(session: Session) -> None:
     """Announce the operators of every installed package, without importing what they need."""
     import gibiane.builtins  # noqa: F401  (declares the operators of the language itself)
@@ -255,15 +285,3 @@ def _packages() -> list[Any]:
 
         found["gibiane_ops"] = import_module("gibiane_ops")
     return list(found.values())
-
-
-def _similar_file(path: Path) -> str | None:
-    from gibiane.diagnostics import nearest
-
-    if not path.parent.is_dir():
-        return None
-    names = [p.name for p in path.parent.iterdir() if p.is_file()]
-    close = nearest(path.name, names, 3)
-    if close is None and path.name + ".dgibi" in names:
-        close = path.name + ".dgibi"
-    return (path.parent / close).as_posix() if close else None

@@ -28,6 +28,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "ORIENTER": ("gibiane_ops.mesh.conversion",),
     "REGENERER": ("gibiane_ops.mesh.conversion",),
     "ARETE": ("gibiane_ops.mesh.conversion",),
+    "MANUEL": ("gibiane_ops.mesh.manual",),
     "SURFACE": ("gibiane_ops.mesh.filling",),
     "MAILLER": ("gibiane_ops.mesh.filling",),
     "REMAILLER": ("gibiane_ops.mesh.remeshing",),
@@ -137,7 +138,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "DESSIN": ("gibiane_ops.output.draw",),
     # operators of the language with further forms
     "ET": ("gibiane_ops.lists.access", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
-    "EXISTE": ("gibiane_ops.fields.components",),
+    "EXISTE": ("gibiane_ops.fields.components", "gibiane_ops.lists.sorting"),
     "ERREUR": ("gibiane_ops.error",),
 }
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from gibiane import procedures
 from gibiane.binding import Operands
 from gibiane.builtins.logic import EXIS
-from gibiane.forms import Arg
+from gibiane.forms import Arg, Key
+from gibiane.library import read_script
 from gibiane.registry import Context, operator
-from gibiane.values import ANY, LOGIQUE, OBJET, PROCEDUR, Objet
+from gibiane.values import ANY, LOGIQUE, MOT, OBJET, PROCEDUR, Objet
 
 OBJE = operator("OBJET", topic="language", summary="make an object of a class",
                 notice="The class is a method, defined by DEBM ... FINM, that is run as constructor with the operands that "
@@ -33,6 +35,18 @@ def _object(ctx: Context, q: Operands) -> Objet:
     this.methods[method.name] = method
     procedures.results(ctx.session.evaluator, method.of(this), q, ctx.node)
     return this
+
+
+UTIL = operator("UTILISER", topic="language", summary="define the procedures of a file",
+                notice="Every procedure that the file holds is defined. A procedure in a file of its own, "
+                       "`name.procedur`, needs no such instruction.",
+                example="OPTI 'SORT' 'some.procedur' ; SORT 'CHAI' 'DEBP TWICE x*ENTIER ; FINP (2 * x) ;' ; "
+                        "UTIL 'PROC' 'some.procedur' ; MESS (TWICE 4) ;", see=["DEBPROC"])
+
+
+@UTIL.form(Key("PROC", "file of procedures", Arg("file", MOT), required=True))
+def _procedures(ctx: Context, proc: str) -> None:
+    procedures.define_all(ctx.session.evaluator, read_script(Path(proc)))
 
 
 @EXIS.form(Arg("o", OBJET, "object"), Arg("name", ANY, "attribute"), gives=[LOGIQUE])

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from gibiane.binding import Operands
@@ -13,6 +11,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ANY, ENTIER, FLOTTANT, LOGIQUE, MOT, POINT, type_of
 
+KEYBOARD, FIRST_FILE = 5, 3
 Reader = Callable[[Context, Operands], Any]
 
 
@@ -88,15 +87,17 @@ def _language(ctx: Context, q: Operands) -> str:
 
 
 def _input(ctx: Context, q: Operands) -> Any:
+    """Read another file here and now, hand over to the keyboard (5), or go back to what was being read (3)."""
     unit = q.read(ENTIER)
-    if unit is not None:
-        ctx.session.state["input unit"] = unit
-        return unit
-    path = Path(_word(q))
-    if not path.is_file():
-        ctx.fail(1130, "the script {path} cannot be opened", path=path.as_posix())
-    ctx.session.state["pending input"] = path
-    return path.as_posix()
+    if unit is None:
+        name = _word(q)
+        ctx.session.pending.append(name)
+        return name
+    if unit not in (KEYBOARD, FIRST_FILE):
+        ctx.fail(42, "{value} is out of bounds: {low} or {high} is accepted", at="value", value=unit, low=FIRST_FILE,
+                 high=KEYBOARD, hint="OPTI DONN 'name' ; reads a file")
+    ctx.session.pending.append(unit)
+    return unit
 
 
 OPTIONS: dict[str, Reader] = {
@@ -142,6 +143,8 @@ def _opti(ctx: Context, q: Operands) -> None:
         for listener in ctx.session.listeners.get(name, []):
             value = listener(ctx, value)
         ctx.session.options[name] = value
+    while ctx.session.pending:
+        ctx.session.switch_input(ctx.session.pending.pop(0), ctx.operands.span(ctx.node))
 
 
 VALE = operator("VALEUR", topic="language", summary="value of an option", terminal=True,
@@ -170,25 +173,6 @@ def _titre(ctx: Context, q: Operands) -> None:
     from gibiane.builtins.text import compose
 
     ctx.session.options["TITR"] = compose(ctx, q).strip()
-
-
-TEMP = operator("TEMPS", topic="language", summary="time since the start, or since the last call",
-                notice="`TEMPS ;` prints the seconds since the session began and starts the clock again; "
-                       "`X = TEMPS 'HORL'` gives the seconds since the clock was last started, as a FLOTTANT.",
-                example="TEMPS 'ZERO' ; X = TEMPS 'HORL' ; MESS (X < 10.) ;")
-
-
-@TEMP.form(Key(("HORLOGE", "ZERO", "IMPR", "NOEC"), "read, restart or print the clock", name="what", repeat=True),
-           gives=["FLOTTANT"])
-def _temps(ctx: Context, what: list[str]) -> float | None:
-    now = time.perf_counter()
-    since = ctx.state.get("clock", ctx.session.started)
-    if "HORLOGE" in what:
-        return now - since
-    if "ZERO" not in what and "NOEC" not in what:
-        ctx.write(f" TEMPS ECOULE : {now - ctx.session.started:.2f} s DONT {now - since:.2f} s")
-    ctx.state["clock"] = now
-    return None
 
 
 INFO = operator("INFO", topic="language", summary="describe an operator", terminal=True,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from gibiane.binding import Operands
 from gibiane.forms import Arg
-from gibiane.registry import Context, operator
-from gibiane.values import ANY, ENTIER, MOT, TABLE, Table
+from gibiane.registry import Context, Refused, operator
+from gibiane.values import ANY, ENTIER, MOT, TABLE, Table, type_of
 
 TABL = operator("TABLE", topic="tables", summary="make a table",
                 notice="An empty table, with its subtype if given (entry 'SOUSTYPE'). `TABL T` gives the table T "
@@ -40,7 +41,8 @@ def _dime_word(ctx: Context, word: str) -> int:
 
 
 INDE = operator("INDEX", topic="tables", summary="indices of a table",
-                notice="A table of the indices, numbered from 1, in order of insertion.",
+                notice="A table of the indices, numbered from 1, in order of insertion. `INDE *'TYPE'` gives the objects "
+                       "of a type, by their names.",
                 example="T = TABL ; T . 'A' = 3 ; I = INDE T ; MESS (I . 1) ;", see=["TABLE"])
 
 
@@ -49,6 +51,19 @@ def _inde(ctx: Context, t: Table) -> Table:
     found = Table("INDEX")
     for number, (index, _) in enumerate(t.entries.values(), 1):
         found.set(number, index)
+    return found
+
+
+@INDE.stream(syntax="*'TYPE'", gives=[TABLE], last=True)
+def _named(ctx: Context, q: Operands) -> Any:
+    if not q.values or q.values[0] != "*":
+        return Refused
+    del q.values[0], q.nodes[0]
+    wanted = str(q.need(MOT, "the type of the objects")).strip()[:8]
+    found = Table()
+    for name, value in sorted(ctx.session.names().items()):
+        if type_of(value)[:8] == wanted and name not in ("VRAI", "FAUX", "D", "C") and name[0] != "&":
+            found.set(name, value)
     return found
 
 

@@ -36,7 +36,7 @@ def compose(ctx: Context, q: Operands) -> str:
             except BadFormat as failure:
                 ctx.places["format"] = place
                 ctx.fail(1094, "the format {format} is not understood", at="format", format=descriptor,
-                         label="here", hint=str(failure))
+                         label="here", hint=failure.template, **failure.fields)
             continue
         if value in MARKS and not (isinstance(node, Literal) and node.quoted) and text_ready(q):
             continue
@@ -44,7 +44,8 @@ def compose(ctx: Context, q: Operands) -> str:
             piece = _image(value, image)
         except BadFormat as failure:
             ctx.places["value"] = node
-            ctx.fail(1094, "this format does not suit a {type}", at="value", type=type_of(value), hint=str(failure))
+            ctx.fail(1094, "this format does not suit a {type}", at="value", type=type_of(value),
+                     hint=failure.template, **failure.fields)
         if piece is None:
             ctx.places["value"] = node
             ctx.fail(39, "a {type} has no text image", at="value", type=type_of(start),
@@ -64,9 +65,9 @@ def text_ready(q: Operands) -> bool:
 def _image(value: Any, image: Format) -> str | None:
     kind = type_of(value)
     if kind == MOT:
-        return str(value)
+        return image.word(value)
     if kind == ENTIER:
-        return str(value)
+        return image.integer(value)
     if kind == FLOTTANT:
         return image.image(value)
     if kind == LOGIQUE:
@@ -134,21 +135,33 @@ def _word(ctx: Context, q: Operands) -> str:
 
 
 TEXT = operator("TEXTE", topic="values", summary="keep an instruction as text, run where it is read", terminal=True,
-                notice="The text of one elementary instruction; naming the object runs it.",
+                notice="The text of one elementary instruction, joined of words and numbers; naming the object puts its "
+                       "content there, and so runs it.",
                 example="T = TEXTE 'MESS 1' ; T ;", see=["MOT"])
 
 
-@TEXT.form(Arg("x", (MOT, TEXTE), "text"), gives=[TEXTE])
-def _text(ctx: Context, x: Any) -> Texte:
-    if isinstance(x, Texte):
-        return x
-    source = SourceText("<TEXTE>", x.rstrip().rstrip(";"))
+@TEXT.stream(syntax="x:MOT|ENTIER|FLOTTANT|TEXTE...", gives=[TEXTE])
+def _text(ctx: Context, q: Operands) -> Texte:
+    if len(q.values) == 1 and isinstance(q.values[0], Texte):
+        found = q.values.pop()
+        q.nodes.pop()
+        return found
+    parts: list[str] = []
+    while q.values:
+        ctx.places["x"] = q.nodes[0]
+        value, _ = q.take((ANY,))
+        piece = value.text if isinstance(value, Texte) else _image(value, DEFAULT)
+        if piece is None:
+            ctx.fail(39, "a {type} has no text image", at="x", type=type_of(value))
+        parts.append(piece.strip() if len(parts) or q.values else piece)
+    text = " ".join(parts)
+    source = SourceText("<TEXTE>", text.rstrip().rstrip(";"))
     instructions = parse(SourceText("<TEXTE>", source.text + " ;"))
     if len(instructions) != 1 or instructions[0].targets:
         ctx.fail(21, "a TEXTE holds one elementary instruction, without = and ;", at="x")
     if instructions[0].bad is not None:
         raise GibianeError(instructions[0].bad)
-    return Texte(x, instructions[0].items, instructions[0].source)
+    return Texte(text, instructions[0].items, instructions[0].source)
 
 
 LIST = operator("LISTER", topic="output", summary="print an object", terminal=True,

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane.forms import Arg, Key
-from gibiane.registry import Context, operator
-from gibiane.values import ENTIER, FLOTTANT, LISTENTI, LISTMOTS, LISTREEL, MOT, TABLE, Table, type_of
+from gibiane.registry import Context, Refused, extend, operator
+from gibiane.values import ENTIER, FLOTTANT, LISTENTI, LISTMOTS, LISTREEL, LOGIQUE, MOT, TABLE, Table, type_of
 from gibiane_ops.values.listes import AnyList, ListEnti, ListMots, ListReel, items_of, like
 
 LISTS = (LISTREEL, LISTENTI, LISTMOTS)
@@ -112,6 +112,45 @@ def _where_word(ctx: Context, x: str, dans: ListMots | str, noca: bool, tous: bo
     text, part = (dans.upper(), x.upper()) if noca else (dans, x)
     hits = [bool(part) and text.startswith(part, i) for i in range(len(text))]
     return _found(ctx, np.array(hits, dtype=bool), tous)
+
+
+EXIS = extend("EXIS")
+
+
+@EXIS.form(Arg("values", LISTENTI, "list"), Arg("x", ENTIER, "value"), gives=[LOGIQUE])
+def _has_integer(ctx: Context, values: ListEnti, x: int) -> bool:
+    return bool((values.values == x).any())
+
+
+@EXIS.form(
+    Arg("values", LISTREEL, "list"),
+    Arg("x", FLOTTANT, "value"),
+    Arg("tolerance", FLOTTANT, optional=True),
+    gives=[LOGIQUE],
+)
+def _has_real(ctx: Context, values: ListReel, x: float, tolerance: float | None) -> bool:
+    return bool(_near(values.values, x, tolerance).any())
+
+
+@EXIS.form(
+    Arg("values", LISTMOTS, "list"),
+    Arg("x", LISTMOTS, "words"),
+    Key(("ET", "OU"), "all of them, or one of them", name="how"),
+    gives=["LOGIQUE..."],
+)
+def _has_words(ctx: Context, values: ListMots, x: ListMots, how: str | None) -> Any:
+    found = [word in values.words for word in x.words]
+    if how is None:
+        return tuple(found)
+    return all(found) if how == "ET" else any(found)
+
+
+@EXIS.form(Arg("values", LISTMOTS, "list"), Arg("x", MOT, "word"), gives=[LOGIQUE])
+def _has_word(ctx: Context, values: ListMots, x: str) -> Any:
+    if x == "*":  # `EXIS L*'TYPE'` asks for the type of L
+        ctx.operands.push_front([values, x], ctx.node)
+        return Refused
+    return x.rstrip()[:8] in values.words
 
 
 ORDO = operator(
