@@ -50,7 +50,8 @@ class Copier:
         self.motion = motion
         self.over = motion is not None and motion.turns_over
         self.store = nodes_of(ctx)
-        self.zones: dict[int, ModelZone] = {}
+        self.solids: dict[int, ModelZone] = {}
+        self.pairs: dict[int, ContactZone] = {}
         self.nodes = np.unique(np.concatenate([self._nodes(x) for x in objects]))
         moved = move(self.store.coords[self.nodes], self.nodes)
         self.copies = self.store.add(moved, self.store.density[self.nodes])
@@ -67,10 +68,10 @@ class Copier:
         if isinstance(x, ChPoint):
             return x.nodes
         if isinstance(x, Modele):
-            meshes = [zone.mesh for zone in x.zones] + [m for pair in x.contacts for m in (pair.master, pair.slave)]
-            return np.concatenate([with_sides(mesh) for mesh in meshes])
+            zones: list[ModelZone | ContactZone] = [*x.zones, *x.contacts]
+            return np.concatenate([_zone_nodes(zone) for zone in zones])
         if isinstance(x, MChaml):
-            return np.concatenate([with_sides(zone.zone.mesh) for zone in x.zones])
+            return np.concatenate([_zone_nodes(zone.zone) for zone in x.zones])
         self.ctx.fail(39, "a {type} cannot be moved", type=getattr(x, "type_name", type(x).__name__))
 
     def _map(self, ids: IntArray) -> IntArray:
@@ -84,9 +85,9 @@ class Copier:
         if isinstance(x, ChPoint):
             return self._field(x)
         if isinstance(x, Modele):
-            contacts = [ContactZone(self._mesh(c.master), self._mesh(c.slave), c.law, c.kinematics) for c in x.contacts]
-            return Modele([self._zone(zone) for zone in x.zones], contacts)
-        return MChaml([ChamZone(self._zone(z.zone), z.names, z.values) for z in x.zones], x.subtype, x.support)
+            return Modele([self._solid(zone) for zone in x.zones], [self._pair(zone) for zone in x.contacts])
+        zones = [ChamZone(self._zone(z.zone), z.names, z.values) for z in x.zones]
+        return MChaml(zones, x.subtype, x.support, x.title)
 
     def _mesh(self, mesh: Maillage) -> Maillage:
         blocks = []
@@ -97,10 +98,20 @@ class Copier:
             blocks.append(Block(block.shape, cells, block.colours))
         return Maillage(self.store, blocks, {name: self._mesh(side) for name, side in mesh.sides.items()})
 
-    def _zone(self, zone: ModelZone) -> ModelZone:
-        found = self.zones.get(id(zone))
+    def _zone(self, zone: ModelZone | ContactZone) -> ModelZone | ContactZone:
+        return self._solid(zone) if isinstance(zone, ModelZone) else self._pair(zone)
+
+    def _solid(self, zone: ModelZone) -> ModelZone:
+        found = self.solids.get(id(zone))
         if found is None:
-            found = self.zones[id(zone)] = ModelZone(self._mesh(zone.mesh), zone.formulation, zone.law, zone.mode)
+            found = self.solids[id(zone)] = ModelZone(self._mesh(zone.mesh), zone.formulation, zone.law, zone.mode)
+        return found
+
+    def _pair(self, zone: ContactZone) -> ContactZone:
+        found = self.pairs.get(id(zone))
+        if found is None:
+            master, slave = self._mesh(zone.master), self._mesh(zone.slave)
+            found = self.pairs[id(zone)] = ContactZone(master, slave, zone.law, zone.kinematics)
         return found
 
     def _field(self, field: ChPoint) -> ChPoint:
@@ -118,6 +129,12 @@ class Copier:
                     {name: (nodes, turned[:, i]) for i, name in enumerate(names) if name in present or i < dim}
                 )
         return ChPoint(self.store, parts, field.nature, field.title)
+
+
+def _zone_nodes(zone: ModelZone | ContactZone) -> IntArray:
+    if isinstance(zone, ModelZone):
+        return with_sides(zone.mesh)
+    return np.concatenate([with_sides(zone.master), with_sides(zone.slave)])
 
 
 def _isometry(motion: Affine) -> FloatArray:

@@ -220,8 +220,8 @@ def _in_volumes(
         )
     margin = 0.01 if tolerance is None else tolerance
     if how == "BARYCENTRE":
-        rows = [locate.in_mesh(x[b.cells].mean(axis=1), x, solids, margin) for b in g1.blocks]
-        return not_empty(ctx, choose(g1, rows), noid, "g1")
+        centres = [locate.in_mesh(x[b.cells].mean(axis=1), x, solids, margin) for b in g1.blocks]
+        return not_empty(ctx, choose(g1, centres), noid, "g1")
     flag = np.zeros(len(x), bool)
     flag[g1.nodes] = locate.in_mesh(x[g1.nodes], x, solids, margin)
     rows = [flag[b.cells].any(axis=1) if how == "LARGEMENT" else flag[b.cells].all(axis=1) for b in g1.blocks]

@@ -11,7 +11,7 @@ from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE, POINT
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.mesh.building import DIMENSION, dimension, explained, line_nodes, new_mesh, new_point, nodes_of
+from gibiane_ops.mesh.building import DIMENSION, dimension, line_nodes, new_mesh, new_point, nodes_of
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.nodes import IntArray
@@ -176,8 +176,8 @@ def _mesu(ctx: Context, g: Maillage, what: str | None, dens: bool) -> float | Ch
         length = np.linalg.norm(coords[edges[:, 1]] - coords[edges[:, 0]], axis=1)
         nodes, place = np.unique(edges, return_inverse=True)
         place = place.reshape(edges.shape)
-        total = np.bincount(place.ravel(), np.repeat(length, 2))
-        return _scalar(ctx, nodes, total / np.bincount(place.ravel()))
+        around = np.bincount(place.ravel(), np.repeat(length, 2))
+        return _scalar(ctx, nodes, around / np.bincount(place.ravel()))
     top = max(DIMENSION[name] for name in g.shapes)
     wanted = top if what is None else ("LONG", "SURF", "VOLU").index(what) + 1
     if wanted == top + 1 and top == 1:
@@ -189,12 +189,8 @@ def _mesu(ctx: Context, g: Maillage, what: str | None, dens: bool) -> float | Ch
         return abs(_volume_inside(g))
     if wanted > top:
         ctx.fail(16, "this mesh has nothing of this dimension: it holds {shapes}", at="g", shapes=" ".join(g.shapes))
-    total = 0.0
-    for block in g.blocks:
-        if DIMENSION[block.shape] == wanted:
-            with explained(ctx, "g"):
-                total += float(np.abs(geometry.measures(shape(block.shape), coords[block.cells])).sum())
-    return total
+    parts = [geometry.measures(shape(b.shape), coords[b.cells]) for b in g.blocks if DIMENSION[b.shape] == wanted]
+    return float(sum(np.abs(part).sum() for part in parts))
 
 
 def _volume_inside(g: Maillage) -> float:

@@ -222,7 +222,7 @@ def _patch(
     before: Maillage | None,
     after: Maillage | None,
 ) -> Maillage:
-    """Make a surface of a grid: nodes of id -1 are added, -2 is the first of the row; surfaces come before and after."""
+    """Make a surface of a grid: nodes of id -1 are added, -2 is the first of the row; join it to its neighbours."""
     new = ids == -1
     density = np.broadcast_to((sizes[0] + places * (sizes[1] - sizes[0]))[:, None], ids.shape)
     ids[new] = nodes_of(ctx).add(grid[new], density[new])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from gibiane_ops.kernels.arrays import IntArray
@@ -49,7 +51,7 @@ def lowered(name: str, cells: IntArray) -> tuple[dict[str, tuple[IntArray, IntAr
     Notes
     -----
     What counts is which local nodes are equal: each pattern is treated once. Of a volume, the faces are reduced to
-    their different corners, equal opposite faces vanish, and the rest is recognised by its numbers of corners and faces.
+    their different corners, equal opposite faces vanish, and the rest is known by its numbers of corners and faces.
     """
     pattern = np.argmax(cells[:, :, None] == cells[:, None, :], axis=2)
     sound = np.arange(cells.shape[1])
@@ -58,11 +60,12 @@ def lowered(name: str, cells: IntArray) -> tuple[dict[str, tuple[IntArray, IntAr
     hopeless = [np.zeros(0, np.int64)]
     for number, equal in enumerate(kinds):
         rows = np.flatnonzero(kind.ravel() == number)
-        reduced = (name, tuple(sound)) if np.array_equal(equal, sound) else _reduce(name, tuple(equal.tolist()))
+        local: tuple[int, ...] = tuple(equal.tolist())
+        reduced = (name, local) if np.array_equal(equal, sound) else _reduce(name, local)
         if reduced is None:
             hopeless.append(rows)
         else:
-            found.setdefault(reduced[0], []).append((cells[rows][:, list(reduced[1])], rows))
+            found.setdefault(reduced[0], []).append((cells[rows][:, np.array(reduced[1])], rows))
     by_shape = {}
     for lower, parts in found.items():
         rows = np.concatenate([each for _, each in parts])
@@ -120,7 +123,7 @@ def _solid(faces: list[tuple[int, ...]]) -> tuple[str, tuple[int, ...]] | None:
     return None
 
 
-def _other_end(node: int, base: set[int], squares: list[tuple[int, ...]]) -> int | None:
+def _other_end(node: int, base: set[int], squares: Sequence[tuple[int, ...]]) -> int | None:
     """Return the corner joined to a corner of the base by an edge that is not in the base."""
     for face in squares:
         if node in face:

@@ -34,7 +34,7 @@ def contour(blocks: Sequence[Block], which: str) -> IntArray:
     group, first = topology.group_by_nodes(facets.nodes)
     count = np.bincount(group)
     wanted = {"EXTE": count == 1, "INTE": count > 2, "TOUT": count != 2}[which]
-    return facets.nodes[first[wanted]]
+    return np.asarray(facets.nodes[first[wanted]], np.int64)
 
 
 def sharp(points: FloatArray, blocks: Sequence[Block], angle: float) -> IntArray:
@@ -65,4 +65,4 @@ def sharp(points: FloatArray, blocks: Sequence[Block], angle: float) -> IntArray
     other = facets.cell[order[np.minimum(start + 1, len(order) - 1)]]
     cosine = (normals[one] * normals[other]).sum(axis=1)
     fold = (count == 2) & (cosine < np.cos(np.radians(angle)))
-    return facets.nodes[first[fold | (count != 2)]]
+    return np.asarray(facets.nodes[first[fold | (count != 2)]], np.int64)

@@ -89,7 +89,7 @@ def containing(name: str, X: FloatArray, x: FloatArray, tolerance: float = 1e-9)
     xi = reference_coordinates(name, X[near], np.repeat(x[None], len(near), axis=0))
     image = np.einsum("mn,mni->mi", shape(name).N(xi), X[near])
     on = np.linalg.norm(image - x, axis=1) <= 1e-8 * size[near]
-    return near[_in_reference(name, xi, tolerance) & on].astype(np.int64)
+    return np.asarray(near[_in_reference(name, xi, tolerance) & on], np.int64)
 
 
 def in_contours(points: FloatArray, a: FloatArray, b: FloatArray) -> tuple[BoolArray, BoolArray]:
