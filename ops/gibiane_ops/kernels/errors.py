@@ -266,3 +266,42 @@ class StatusCycle(KernelError):
 
     def __str__(self) -> str:
         return f"statuses of pairs {_first(self.pairs)} come back every {self.period} iterations without converging"
+
+
+@dataclass(eq=False)
+class UnsupportedLaw(KernelError):
+    """A contact method given a law that it cannot treat.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    known : str
+        Laws that it treats.
+    """
+
+    method: str
+    known: str
+
+    def __str__(self) -> str:
+        return f"{self.method} treats {self.known} only"
+
+
+@dataclass(eq=False)
+class TooLarge(KernelError):
+    """A computation whose predicted memory exceeds the limit.
+
+    Attributes
+    ----------
+    what : str
+        What would fill the memory.
+    needed, limit : float
+        Bytes.
+    """
+
+    what: str
+    needed: float
+    limit: float
+
+    def __str__(self) -> str:
+        return f"{self.what} would need {self.needed / 1e9:.3g} GB, the limit is {self.limit / 1e9:.3g} GB"

@@ -33,7 +33,7 @@ THREE = bare_interface(np.array([[1, 0.8], [0.8, 1]]), np.array([1, 1.5]), 2)
 def test_one_pair_with_three_solutions(w, r, status):
     # with mu = 2 and this coupling the answer depends on the start: each solution must be recognised as one
     base = solve_tied(THREE)
-    start = ContactState(np.array([w]), np.array([r]), np.array([status]), base.mu, [], base.report)
+    start = ContactState(np.array([w]), np.array([r]), np.array([status]), base.law, [], base.report)
     found = solve_coulomb(THREE, 2.0, start=start)
     np.testing.assert_allclose(found.w, [w], atol=1e-10)
     np.testing.assert_allclose(found.r, [r], atol=1e-10)
@@ -67,7 +67,7 @@ def test_frictionless_drift_is_zero():
     S[1, 3] = S[3, 1] = -1.0
     interface = bare_interface(S, np.array([10, 0.7, 6, -0.7]), 2)
     base = solve_tied(interface)
-    moved = ContactState(np.array([[0, 5.0], [0, 5.0]]), base.r, base.status, base.mu, [], base.report)
+    moved = ContactState(np.array([[0, 5.0], [0, 5.0]]), base.r, base.status, base.law, [], base.report)
     for start in (None, moved):
         np.testing.assert_allclose(solve_coulomb(interface, 0.0, start=start).w, [[0, 0.35], [0, -0.35]], atol=1e-12)
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection, radial_projection
+from gibiane_ops.kernels.contact.cone import norms, radial_projection
 from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.errors import ContactUnbalanced
 
@@ -17,13 +18,13 @@ UNBALANCED = 1e-5
 """Part of the load that may stay unbalanced before the problem is said to have no solution."""
 
 
-def unbalanced_load(interface: Interface, mu: FloatArray, *, max_iter: int = 5000) -> tuple[float, FloatArray]:
-    """Measure the part of the load on free rigid motions that no force of Coulomb's cone can balance.
+def unbalanced_load(interface: Interface, law: Friction, *, max_iter: int = 5000) -> tuple[float, FloatArray]:
+    """Measure the part of the load on free rigid motions that no force of the friction law can balance.
 
     Parameters
     ----------
     interface : Interface
-    mu : (n,) float64
+    law : Friction
     max_iter : int
         Steps of the projected gradient method.
 
@@ -36,8 +37,8 @@ def unbalanced_load(interface: Interface, mu: FloatArray, *, max_iter: int = 500
 
     Notes
     -----
-    Minimises ``abs(R^T (f + r))`` over all r in the cone, R the free motions. A positive minimum proves that there
-    is no static solution; a zero one does not prove that there is one.
+    Minimises ``abs(R^T (f + r))`` over all r in the cone of ``Friction.nearest_possible``, R the free
+    motions. A positive minimum proves that there is no static solution; a zero one does not prove that there is one.
 
     Cost
     ----
@@ -48,12 +49,11 @@ def unbalanced_load(interface: Interface, mu: FloatArray, *, max_iter: int = 500
     shape = interface.n_pairs, interface.dim
     if size == 0:
         return 0.0, np.zeros(shape)
-    mu = np.minimum(mu, 1e6)
     r = ahead = np.zeros(shape)
     left, t = load, 1.0
     for _ in range(max_iter):
         step = ahead - (R @ (load + R.T @ ahead.ravel())).reshape(shape)
-        new = orthogonal_projection(np.where(interface.active, step, 0.0), mu)
+        new = law.nearest_possible(np.where(interface.active, step, 0.0))
         new[~interface.active[:, 0]] = 0.0
         # Nesterov's acceleration, restarted when it turns back
         if ((ahead - new) * (new - r)).sum() > 0:
@@ -83,9 +83,9 @@ def raise_if_unbalanced(interface: Interface, state: ContactState) -> None:
     ContactUnbalanced
         ``kind`` is ``sliding``, ``tipping`` or ``separation``.
     """
-    share, motion = unbalanced_load(interface, state.mu)
+    share, motion = unbalanced_load(interface, state.law)
     if share > UNBALANCED:
-        raise ContactUnbalanced(kind_of_motion(motion, state.mu), share, motion, state.history, state)
+        raise ContactUnbalanced(kind_of_motion(motion, state.law.mu), share, motion, state.history, state)
 
 
 def raise_if_runaway(interface: Interface, last: ContactState, best: ContactState) -> None:
@@ -110,11 +110,11 @@ def raise_if_runaway(interface: Interface, last: ContactState, best: ContactStat
     motion = (R @ (R.T @ last.w.ravel())).reshape(last.w.shape)
     size = float(np.abs(motion).max(initial=0))
     if size > RUNAWAY * interface.length_scale > 0:
-        r = radial_projection(last.r, last.mu)
+        r = radial_projection(last.r, last.law.mu)
         load = float(np.linalg.norm(R.T @ interface.f)) or interface.force_scale
         share = float(np.linalg.norm(R.T @ (interface.f + r.ravel()))) / load
         motion = motion / size
-        raise ContactUnbalanced(kind_of_motion(motion, last.mu), share, motion, best.history, best)
+        raise ContactUnbalanced(kind_of_motion(motion, last.law.mu), share, motion, best.history, best)
 
 
 def kind_of_motion(motion: FloatArray, mu: FloatArray) -> str:

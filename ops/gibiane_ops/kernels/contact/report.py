@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.contact.cone import friction_bound, norms
+from gibiane_ops.kernels.contact.cone import norms
 from gibiane_ops.kernels.contact.interface import Interface
-from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.contact.law import BoolArray, Friction
 
 OPEN, STICK, SLIP = 0, 1, 2
 
@@ -67,7 +67,7 @@ class ContactState:
     r : (n, d) float64, force on body 1
     status : (n,) int64
         0 open, 1 stick, 2 slip.
-    mu : (n,) float64
+    law : Friction
     history : list of float
         Residual after each step, relative.
     report : ContactReport
@@ -76,7 +76,7 @@ class ContactState:
     w: FloatArray
     r: FloatArray
     status: IntArray
-    mu: FloatArray
+    law: Friction
     history: list[float]
     report: ContactReport
 
@@ -86,38 +86,16 @@ class ContactState:
         return len(self.history)
 
 
-def coefficients(interface: Interface, mu: float | FloatArray) -> FloatArray:
-    """Give one friction coefficient per pair.
-
-    Parameters
-    ----------
-    interface : Interface
-    mu : float or (n,) float64
-
-    Returns
-    -------
-    (n,) float64
-
-    Raises
-    ------
-    BadValue
-        When a coefficient is negative or undefined.
-    """
-    found = np.broadcast_to(np.asarray(mu, dtype=np.float64), interface.n_pairs).copy()
-    bad = ~(found >= 0)
-    if bad.any():
-        raise BadValue("friction coefficient", float(found[bad][0]), "mu >= 0")
-    return found
-
-
 def check_state(
     interface: Interface,
     w: FloatArray,
     r: FloatArray,
     status: IntArray,
-    mu: FloatArray,
+    law: Friction,
     history: list[float],
     slip_origin: FloatArray | None,
+    *,
+    bonded: BoolArray | None = None,
 ) -> ContactState:
     """Measure a state against the laws, from the forces and displacements alone.
 
@@ -126,10 +104,12 @@ def check_state(
     interface : Interface
     w, r : (n, d) float64
     status : (n,) int64
-    mu : (n,) float64
+    law : Friction
     history : list of float
     slip_origin : (n, d - 1) float64 or None
         Tangential displacements from which slip is counted.
+    bonded : (n,) bool, optional
+        Pairs that adhesion holds: no gap, and a tension up to the adhesion.
 
     Returns
     -------
@@ -137,10 +117,13 @@ def check_state(
     """
     force = max(float(np.abs(r).max(initial=0)), interface.force_scale) or 1.0
     length = max(float(np.abs(w).max(initial=0)), force / interface.kref)
-    bound = friction_bound(r[:, 0], mu)
+    bonded = np.zeros(len(w), dtype=bool) if bonded is None else bonded
+    slip = law.slip_of(w[:, 1:] - (0.0 if slip_origin is None else slip_origin), r[:, 1:])
+    bound = _reachable(law, r[:, 0], slip, bonded)
     finite = np.where(np.isfinite(bound), bound, 0.0)
-    slip = w[:, 1:] - (0.0 if slip_origin is None else slip_origin)
     opening = interface.gap - w[:, 0]
+    apart = np.where(bonded, -np.abs(opening), opening)
+    allowed = np.where(bonded, law.adhesion, 0.0)
     power = np.einsum("ni,ni->n", r[:, 1:], slip)
     limited = np.isfinite(bound)
     equilibrium = (interface.S @ w.ravel() - interface.f).reshape(w.shape) - r
@@ -148,8 +131,8 @@ def check_state(
     friction = max(float(finite.max(initial=0)), 1e-6 * force)
     holds = interface.active[:, 0]
     report = ContactReport(
-        penetration=float((-opening[holds]).max(initial=0)) / length,
-        tension=float(r[:, 0].max(initial=0)) / force,
+        penetration=float((-apart[holds]).max(initial=0)) / length,
+        tension=float((r[:, 0] - allowed).max(initial=0)) / force,
         excess_friction=float((norms(r[:, 1:]) - bound)[limited].max(initial=0)) / friction,
         adhesion_power=float(np.abs(r[holds, 0] * opening[holds]).sum()) / (force * length),
         friction_power=float((finite * norms(slip) + power)[limited].sum()) / (force * length),
@@ -159,4 +142,11 @@ def check_state(
         n_stick=int((status == STICK).sum()),
         n_slip=int((status == SLIP).sum()),
     )
-    return ContactState(w, r, status, mu, list(history), report)
+    return ContactState(w, r, status, law, list(history), report)
+
+
+def _reachable(law: Friction, normal: FloatArray, slip: FloatArray, bonded: BoolArray) -> FloatArray:
+    """Give the largest friction force: the bound, or what Norton-Hoff allows at the present slip."""
+    bound = law.bound(normal, bonded)
+    power = np.where(law.exponent > 0, norms(slip) / law.slip_scale, 1.0)
+    return np.where(law.exponent > 0, bound * power ** np.where(law.exponent > 0, law.exponent, 1.0), bound)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.contact.cone import norms, radial_projection
+from gibiane_ops.kernels.contact.cone import norms
 from gibiane_ops.kernels.contact.interface import Interface
-from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state, coefficients
+from gibiane_ops.kernels.contact.law import Friction
+from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state
 from gibiane_ops.kernels.errors import NotConverged, StatusCycle
 
 BoolArray = NDArray[np.bool_]
@@ -20,7 +21,7 @@ BoolArray = NDArray[np.bool_]
 
 def solve_statuses(
     interface: Interface,
-    mu: float | FloatArray,
+    mu: float | FloatArray | Friction,
     *,
     tolerance: float = 1e-4,
     closing_distance: float | None = None,
@@ -31,8 +32,8 @@ def solve_statuses(
     Parameters
     ----------
     interface : Interface
-    mu : float or (n,) float64
-        Friction coefficients, not negative.
+    mu : float, (n,) float64 or Friction
+        Friction coefficients, not negative, or Coulomb's law with cohesion.
     tolerance : float
         Largest relative change of the largest tangential force.
     closing_distance : float, optional
@@ -54,6 +55,8 @@ def solve_statuses(
         After ``max_iter`` solutions; ``best`` holds the last state.
     BadValue
         When a coefficient is negative.
+    UnsupportedLaw
+        For another law than Coulomb's, with cohesion or not.
 
     Notes
     -----
@@ -73,12 +76,13 @@ def solve_statuses(
     ----
     One dense factorisation per set of closed pairs, one back substitution per iteration.
     """
-    mu = coefficients(interface, mu)
+    law = Friction.of(interface.n_pairs, mu)
+    law.need_coulomb("the fixed point of statuses", cohesion=True)
     n, d = interface.n_pairs, interface.dim
     closing = 0.05 * interface.length_scale if closing_distance is None else closing_distance
     tied = np.where(interface.active, -interface.f.reshape(n, d), 0.0)
     closed = interface.active[:, 0] & (tied[:, 0] <= 0)
-    G = _cut(tied, tied[:, 0], mu, closed)
+    G = _cut(tied, tied[:, 0], law, closed)
     normal = _NormalContact(interface, closed)
     history: list[float] = []
     seen: list[IntArray] = []
@@ -87,11 +91,11 @@ def solve_statuses(
         opens = closed & (r[:, 0] > 0)
         closes = interface.active[:, 0] & ~closed & (w[:, 0] > interface.gap + closing)
         new_closed = (closed & ~opens) | closes
-        new_G = _cut(tied, r[:, 0], mu, new_closed)
+        new_G = _cut(tied, r[:, 0], law, new_closed)
         largest = float(norms(new_G).max(initial=0))
         change = abs(largest - float(norms(G).max(initial=0)))
         history.append(change / largest if largest else change)
-        state = check_state(interface, w, r, _statuses(closed, tied, G), mu, history, None)
+        state = check_state(interface, w, r, _statuses(closed, tied, G), law, history, None)
         if not (opens | closes).any():
             if change <= tolerance * largest:
                 return state
@@ -143,10 +147,12 @@ class _NormalContact:
         return np.asarray(R[free] @ Vt[still].T)
 
 
-def _cut(tied: FloatArray, normal: FloatArray, mu: FloatArray, closed: BoolArray) -> FloatArray:
+def _cut(tied: FloatArray, normal: FloatArray, law: Friction, closed: BoolArray) -> FloatArray:
     """Cut the tangential reaction of tied bodies at the current bound; nothing on open pairs."""
-    held = np.where(closed, normal, 0.0)
-    return radial_projection(np.column_stack([held, tied[:, 1:]]), mu)[:, 1:]
+    bound = law.bound(np.where(closed, normal, 0.0))
+    size = norms(tied[:, 1:])
+    ratio = np.divide(bound, size, out=np.ones_like(size), where=size > bound)
+    return np.asarray(ratio[:, None] * tied[:, 1:])
 
 
 def _statuses(closed: BoolArray, tied: FloatArray, G: FloatArray) -> IntArray:
