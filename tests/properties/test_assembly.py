@@ -9,11 +9,14 @@ from hypothesis import strategies as st
 from gibiane_ops.kernels import assembly, geometry, topology
 from gibiane_ops.kernels.arrays import strain_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
+from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import SHAPES
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.rigid import rigid_modes
 
-NAMES = ["TRI3", "QUA4", "TET4", "PYR5", "PRI6", "CUB8"]
+LINEAR = ["TRI3", "QUA4", "TET4", "PYR5", "PRI6", "CUB8"]
+NAMES = [*LINEAR, *(QUADRATIC[name] for name in LINEAR)]
+CORNERS = {QUADRATIC[name]: name for name in LINEAR}
 E, NU = 210000.0, 0.3
 # Cutting of a CUB8: six tetrahedra around the diagonal 0-6, two prisms; pyramids take the centre (8) as apex.
 CUTS = {
@@ -28,6 +31,8 @@ CUTS = {
 
 def box(name: str, counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Mesh [0, counts] with one shape, unit cells."""
+    if name in CORNERS:
+        return with_middles(name, *box(CORNERS[name], counts))
     dim = len(counts)
     size = [n + 1 for n in counts]
     points = np.stack(np.meshgrid(*[np.arange(n, dtype=float) for n in size], indexing="ij"), -1).reshape(-1, dim)
@@ -43,11 +48,21 @@ def box(name: str, counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     return points, cells[:, CUTS[name]].reshape(-1, SHAPES[name].n_nodes)
 
 
+def with_middles(name: str, points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Add the mid-nodes that shape `name` wants to a mesh of linear cells."""
+    ends = np.array([edge[:2] for edge in SHAPES[name].edges])
+    pairs = np.sort(cells[:, ends].reshape(-1, 2), axis=1)
+    unique, number = np.unique(pairs, axis=0, return_inverse=True)
+    middles = len(points) + number.reshape(len(cells), -1)
+    return np.vstack([points, points[unique].mean(axis=1)]), np.hstack([cells, middles])
+
+
 def mesh(name: str, seed: int = 0, distortion: float = 0.15, counts: tuple[int, ...] | None = None):
+    """Mesh a box with cells out of shape; those of second degree keep straight edges, mid-nodes in the middle."""
     dim = SHAPES[name].dim
-    points, cells = box(name, counts or (3, 2, 2)[:dim])
+    points, cells = box(CORNERS.get(name, name), counts or (3, 2, 2)[:dim])
     points = points + distortion * np.random.default_rng(seed).uniform(-1, 1, points.shape)
-    return points, cells
+    return with_middles(name, points, cells) if name in CORNERS else (points, cells)
 
 
 def law(name: str) -> np.ndarray:

@@ -10,12 +10,15 @@ import pytest
 from scipy.special import beta
 
 from gibiane_ops.kernels import geometry, quadrature
+from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.shape import Shape
-from gibiane_ops.kernels.elements.table import BY_GMSH, BY_MESHIO, SHAPES
+from gibiane_ops.kernels.elements.table import BY_GMSH, BY_MESHIO, SHAPES, quadratic
+from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.quadrature import Rule
 
 EVERY = list(SHAPES.values())
 SOLID = [each for each in EVERY if each.dim > 0]
+LINEAR = {quadratic(name).name: SHAPES[name] for name in QUADRATIC}
 
 
 def by_name(each: Shape) -> str:
@@ -53,13 +56,10 @@ def monomial_integral(domain: str, powers: tuple[int, ...]) -> float:
 
 DOMAINS = {
     "POI1": "point",
-    "SEG2": "cube",
-    "TRI3": "simplex",
-    "QUA4": "cube",
-    "TET4": "simplex",
-    "PYR5": "pyramid",
-    "PRI6": "prism",
-    "CUB8": "cube",
+    **dict.fromkeys(("SEG2", "SEG3", "QUA4", "QUA8", "CUB8", "CU20"), "cube"),
+    **dict.fromkeys(("TRI3", "TRI6", "TET4", "TE10"), "simplex"),
+    **dict.fromkeys(("PYR5", "PY13"), "pyramid"),
+    **dict.fromkeys(("PRI6", "PR15"), "prism"),
 }
 RULES: list[tuple[str, Rule]] = [
     *((DOMAINS[each.name], rule) for each in EVERY for rule in (each.stiffness_rule, each.mass_rule)),
@@ -67,7 +67,9 @@ RULES: list[tuple[str, Rule]] = [
     ("cube", quadrature.square(3)),
     ("cube", quadrature.cube(3)),
     ("simplex", quadrature.triangle(4)),
+    ("simplex", quadrature.tetrahedron(5)),
     ("prism", quadrature.prism(4, 3)),
+    ("pyramid", quadrature.pyramid(4)),
 ]
 
 
@@ -84,9 +86,12 @@ def test_kronecker(each: Shape) -> None:
 
 
 @pytest.mark.parametrize("each", SOLID, ids=by_name)
-def test_linear_fields_are_reproduced(each: Shape) -> None:
+def test_polynomials_of_the_degree_are_reproduced(each: Shape) -> None:
     xi = inside(each)
-    assert np.allclose(each.N(xi) @ each.ref_nodes, xi, atol=1e-13)
+    for powers in product(range(each.degree + 1), repeat=each.dim):
+        if sum(powers) <= each.degree:
+            nodal = np.prod(each.ref_nodes ** np.array(powers), axis=1)
+            assert np.allclose(each.N(xi) @ nodal, np.prod(xi ** np.array(powers), axis=1), atol=1e-13)
 
 
 @pytest.mark.parametrize("each", SOLID, ids=by_name)
@@ -111,9 +116,43 @@ def test_quadrature_reaches_its_degree(domain: str, rule: Rule) -> None:
 @pytest.mark.parametrize("each", SOLID, ids=by_name)
 def test_quadrature_claims_no_less_than_it_gives(each: Shape) -> None:
     """Weights are positive and points inside: no cancellation, no evaluation outside the cell."""
+    corners = LINEAR.get(each.name, each)
     for rule in (each.stiffness_rule, each.mass_rule):
         assert np.all(rule.weights > 0)
-        assert np.all(each.N(rule.points) > -1e-14)
+        assert np.all(corners.N(rule.points) > -1e-14)
+
+
+@pytest.mark.parametrize("each", EVERY, ids=by_name)
+def test_mass_rule_is_exact_for_the_products(each: Shape) -> None:
+    """The products of shape functions are integrated as by a much finer rule."""
+    fine = {"point": quadrature.point, "simplex": _fine_simplex, "cube": _fine_cube, "prism": _fine_prism,
+            "pyramid": lambda: quadrature.pyramid(6)}[DOMAINS[each.name]]  # fmt: skip
+    rule = fine(each.dim) if DOMAINS[each.name] in ("simplex", "cube") else fine()
+    (points, weights), N = each.mass_gauss, each.N
+    assert np.allclose(
+        (N(points).T * weights) @ N(points), (N(rule.points).T * rule.weights) @ N(rule.points), atol=1e-13
+    )
+
+
+def _fine_cube(dim: int) -> Rule:
+    return (quadrature.line, quadrature.square, quadrature.cube)[dim - 1](6)
+
+
+def _fine_simplex(dim: int) -> Rule:
+    """Fold the square or the cube onto the simplex (Duffy): exact for polynomials of moderate degree."""
+    t = (_fine_cube(dim).points + 1) / 2
+    weights = _fine_cube(dim).weights / 2**dim
+    if dim == 2:
+        return Rule(np.c_[t[:, 0], t[:, 1] * (1 - t[:, 0])], weights * (1 - t[:, 0]), 9, "Duffy")
+    x, y = t[:, 0], t[:, 1] * (1 - t[:, 0])
+    z = t[:, 2] * (1 - x - y)
+    return Rule(np.c_[x, y, z], weights * (1 - x) * (1 - x - y), 9, "Duffy")
+
+
+def _fine_prism() -> Rule:
+    flat, tall = _fine_simplex(2), quadrature.line(6)
+    points = np.hstack([np.tile(flat.points, (6, 1)), np.repeat(tall.points, len(flat.points), 0)])
+    return Rule(points, np.outer(tall.weights, flat.weights).ravel(), 9, "product")
 
 
 @pytest.mark.parametrize("each", [s for s in SOLID if s.dim >= 2], ids=by_name)
@@ -166,14 +205,53 @@ def test_numbering_is_that_of_gmsh(each: Shape, gmsh_session) -> None:
     assert (dim, n_nodes, n_corners) == (each.dim, each.n_nodes, each.n_corners)
     assert order == each.degree
     if each.dim:
-        assert np.allclose(np.reshape(coordinates, (n_nodes, dim)), each.ref_nodes)
+        order_of_gmsh = list(each.gmsh_order or range(each.n_nodes))
+        assert np.allclose(np.reshape(coordinates, (n_nodes, dim))[order_of_gmsh], each.ref_nodes)
 
 
 @pytest.mark.parametrize("each", EVERY, ids=by_name)
 def test_meshio_knows_the_cell(each: Shape) -> None:
-    block = meshio.CellBlock(each.meshio_name, np.arange(each.n_nodes)[None])
-    assert block.dim == each.dim
     assert meshio.gmsh.meshio_to_gmsh_type[each.meshio_name] == each.gmsh_type
+    assert meshio._mesh.topological_dimension.get(each.meshio_name, 3) == each.dim
+
+
+@pytest.mark.parametrize("each", [s for s in SOLID if s.degree == 2], ids=by_name)
+def test_numbering_is_that_of_vtk(each: Shape) -> None:
+    """The numbering of meshio is that of VTK, to which it turns the one of gmsh."""
+    cells = np.arange(each.n_nodes)[None]
+    turned = meshio.gmsh.common._gmsh_to_meshio_order(each.meshio_name, cells)[0]
+    assert tuple(turned) == (each.gmsh_order or tuple(range(each.n_nodes)))
+
+
+@pytest.mark.parametrize("name", QUADRATIC)
+def test_mid_nodes_are_in_the_middle_of_the_edges(name: str) -> None:
+    linear, each = SHAPES[name], quadratic(name)
+    assert each.n_corners == linear.n_nodes
+    assert np.array_equal(each.ref_nodes[: each.n_corners], linear.ref_nodes)
+    for a, b, middle in each.edges:
+        assert np.allclose(each.ref_nodes[middle], (each.ref_nodes[a] + each.ref_nodes[b]) / 2)
+    for face, nodes in each.faces:
+        if each.dim > 1:
+            face_nodes = each.ref_nodes[list(nodes)]
+            for a, b, middle in SHAPES[face].edges:
+                assert np.allclose(face_nodes[middle], (face_nodes[a] + face_nodes[b]) / 2)
+
+
+def test_a_quadratic_shape_has_no_quadratic_shape() -> None:
+    with pytest.raises(BadValue):
+        quadratic("CU20")
+
+
+@pytest.mark.parametrize("each", [s for s in SOLID if s.dim == 3], ids=by_name)
+def test_the_trace_on_a_face_is_that_of_the_face(each: Shape) -> None:
+    """Neighbours of different shapes meet without a gap: on a face only its nodes count, with its own functions."""
+    for name, nodes in each.faces:
+        face = SHAPES[name]
+        eta = inside(face)
+        xi = face.N(eta) @ each.ref_nodes[list(nodes)]
+        values = each.N(xi)
+        assert np.allclose(values[:, list(nodes)], face.N(eta), atol=1e-12)
+        assert np.allclose(np.delete(values, list(nodes), axis=1), 0.0, atol=1e-12)
 
 
 def test_names_and_codes_are_unique() -> None:

@@ -136,7 +136,7 @@ def tetrahedron(degree: int) -> Rule:
     Parameters
     ----------
     degree : int
-        1 (one point) or 2 (four points).
+        1 (one point), 2 (four points) or 5 (fourteen points).
 
     Returns
     -------
@@ -147,6 +147,8 @@ def tetrahedron(degree: int) -> Rule:
     KeyError
         For another degree: the table holds those that the elements use.
     """
+    if degree == 5:
+        return _tetrahedron_14()
     inner = (5 - np.sqrt(5)) / 20
     a, source = {1: (0.25, "centroid"), 2: (float(inner), "Hammer-Stroud 1956, 4 points")}[degree]
     if degree == 1:
@@ -154,6 +156,22 @@ def tetrahedron(degree: int) -> Rule:
     points = np.full((4, 3), a)
     points[[1, 2, 3], [0, 1, 2]] = 1 - 3 * a
     return Rule(points, np.full(4, 1 / 24), 2, source)
+
+
+def _tetrahedron_14() -> Rule:
+    """Return the rule of 14 points, two orbits near the corners and faces and one near the edges."""
+    points, weights = [], []
+    for a, w in ((0.31088591926330060980, 0.018781320953002641800), (0.092735250310891226402, 0.012248840519393658257)):
+        orbit = np.full((4, 3), a)
+        orbit[[1, 2, 3], [0, 1, 2]] = 1 - 3 * a
+        points.append(orbit)
+        weights += [w] * 4
+    a, w = 0.045503704125649649492, 0.0070910034628469110730
+    pairs = np.array([(0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)])
+    bary = np.full((6, 4), a)
+    bary[np.arange(6)[:, None], pairs] = 0.5 - a
+    points.append(bary[:, 1:])
+    return Rule(np.vstack(points), np.array(weights + [w] * 6), 5, "Walkington 2000, 14 points")
 
 
 @cache
@@ -178,8 +196,37 @@ def prism(degree: int, n: int) -> Rule:
 
 
 @cache
-def pyramid() -> Rule:
-    """Return the conical product rule of 8 points on the pyramid of base [-1, 1]^2 and apex (0, 0, 1).
+def pyramid(n: int = 2) -> Rule:
+    """Return the conical product rule of n^3 points on the pyramid of base [-1, 1]^2 and apex (0, 0, 1).
+
+    Parameters
+    ----------
+    n : int
+        Points per axis.
+
+    Returns
+    -------
+    Rule
+        Of degree 2n - 1.
+
+    Notes
+    -----
+    With x = (1 - z) a, y = (1 - z) b the volume element is (1 - z)^2 da db dz: Gauss-Legendre in a and b,
+    Gauss-Jacobi in z. The rational functions of the pyramids are polynomials of a, b and z.
+
+    Source
+    ------
+    Stroud 1971, conical product rules.
+    """
+    heights, layer = _towards_apex(n)
+    base = square(n)
+    points = np.vstack([np.c_[base.points * (1 - z), np.full(n * n, z)] for z in heights])
+    return Rule(points, np.outer(layer, base.weights).ravel(), 2 * n - 1, "Stroud 1971, conical product")
+
+
+@cache
+def pyramid_5() -> Rule:
+    """Return the rule of 5 points on the pyramid of base [-1, 1]^2 and apex (0, 0, 1), of degree 2.
 
     Returns
     -------
@@ -187,19 +234,21 @@ def pyramid() -> Rule:
 
     Notes
     -----
-    With x = (1 - z) a, y = (1 - z) b the volume element is (1 - z)^2 da db dz: Gauss-Legendre in a and b,
-    Gauss-Jacobi in z. The two Jacobi points are the roots of z^2 - (2/3) z + 1/15, orthogonal to degree 1 for the
-    weight (1 - z)^2 on [0, 1].
-
-    Source
-    ------
-    Stroud 1971, conical product rules.
+    Four points at height ``z1`` under the apex edges and one on the axis at ``z2``, of equal weights. The integrals of
+    z and z^2 (means 1/4 and 1/10) give ``4 z1 + z2 = 5/4`` and ``4 z1^2 + z2^2 = 1/2``, that of x^2 their place 1/2.
     """
-    root = np.sqrt(2 / 45)
-    heights = np.array([1 / 3 - root, 1 / 3 + root])
-    # Moments of (1 - z)^2: the integral is 1/3 for 1 and 1/12 for z.
-    first = (heights[1] / 3 - 1 / 12) / (heights[1] - heights[0])
-    layer = np.array([first, 1 / 3 - first])
-    base = square(2)
-    points = np.vstack([np.c_[base.points * (1 - z), np.full(4, z)] for z in heights])
-    return Rule(points, np.outer(layer, base.weights).ravel(), 3, "Stroud 1971, conical product")
+    low = (10 - np.sqrt(15)) / 40
+    points = np.vstack(
+        [np.c_[0.5 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]), np.full(4, low)], [0, 0, 1.25 - 4 * low]]
+    )
+    return Rule(points, np.full(5, 4 / 15), 2, "moments up to degree 2")
+
+
+def _towards_apex(n: int) -> tuple[FloatArray, FloatArray]:
+    """Return points and weights on [0, 1] for the weight (1 - z)^2 (Golub-Welsch, Jacobi polynomials P^(2, 0))."""
+    k = np.arange(n, dtype=np.float64)
+    diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
+    k = k[1:]
+    beside = np.sqrt(4 * k * (k + 2) * k * (k + 2) / ((2 * k + 2) ** 2 * (2 * k + 3) * (2 * k + 1)))
+    x, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
+    return (1 + x) / 2, vectors[0] ** 2 / 3

@@ -1,10 +1,14 @@
-"""CUB8, the cube [-1, 1]^3: nodes 0-3 at the bottom, counterclockwise seen from above, 4-7 above them."""
+"""CUB8 and CU20, the cube [-1, 1]^3: corners 0-3 at the bottom, counterclockwise seen from above, 4-7 above them.
+
+The mid-nodes of CU20 follow: bottom, top, vertical edges.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from gibiane_ops.kernels import quadrature
+from gibiane_ops.kernels.elements import quadratic
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.tensor import multilinear
 
@@ -46,4 +50,23 @@ CUB8 = Shape(
     gmsh_type=5,
     meshio_name="hexahedron",
     n_corners=8,
+)
+
+_N2, _dN2 = quadratic.serendipity_basis(CUB8)
+
+CU20 = Shape(
+    name="CU20",
+    dim=CUB8.dim,
+    degree=2,
+    ref_nodes=quadratic.ref_nodes(CUB8),
+    N=_N2,
+    dN=_dN2,
+    faces=quadratic.faces(CUB8),
+    edges=quadratic.edges(CUB8),
+    stiffness_rule=quadrature.cube(3),
+    mass_rule=quadrature.cube(3),
+    gmsh_type=17,
+    meshio_name="hexahedron20",
+    n_corners=CUB8.n_corners,
+    gmsh_order=(0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
 )

@@ -25,7 +25,8 @@ class Shape:
     degree : int
         Degree of the polynomials that the interpolation holds completely.
     ref_nodes : (n_nodes, dim) float64
-        Reference coordinates of the nodes, in the numbering of gmsh and VTK.
+        Reference coordinates of the nodes, in the numbering of VTK: corners, then the mid-nodes of the edges in the
+        order of `edges`. (Cast3M numbers its quadratic elements otherwise, corners and mid-nodes in turn.)
     N : callable
         ``N(xi)`` with xi : (q, dim) gives the shape functions, (q, n_nodes).
     dN : callable
@@ -45,6 +46,8 @@ class Shape:
         Cell name of meshio.
     n_corners : int
         The first n_corners nodes are the corners; a facet is identified by its corners.
+    gmsh_order : tuple of int
+        Node i is node ``gmsh_order[i]`` of gmsh; empty when the numberings agree.
     """
 
     name: str
@@ -60,6 +63,7 @@ class Shape:
     gmsh_type: int
     meshio_name: str
     n_corners: int
+    gmsh_order: tuple[int, ...] = ()
 
     @property
     def n_nodes(self) -> int:
