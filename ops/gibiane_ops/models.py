@@ -29,8 +29,7 @@ MODE = operator(
     "without friction) makes a contact zone: G1 is the master surface, G2 the slave, facets with "
     "normals out of their solids; keywords and surfaces come in any order. Where the two surfaces "
     "have coincident nodes, contact acts on pairs of nodes.",
-    example="OPTI DIME 3 ELEM CUB8 ; B = DALL (DROI 1 (0 0 0) (1 0 0)) (DROI 1 (1 0 0) (1 1 0))\n"
-    "  (DROI 1 (1 1 0) (0 1 0)) (DROI 1 (0 1 0) (0 0 0)) 'PLAN' ;\n"
+    example="OPTI DIME 3 ELEM CUB8 ; B = (DROI 1 (0 0 0) (1 0 0)) TRAN 1 (0 1 0) ;\n"
     "V = B VOLU 1 'TRAN' (0 0 1) ; MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ; LIST 'RESU' MO ;",
     see=["MATERIAU", "RIGIDITE"],
 )

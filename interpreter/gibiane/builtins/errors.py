@@ -31,7 +31,7 @@ def _raise(ctx: Context, n: int, avec: list[Any] | None) -> None:
 @ERRE.form(Arg("text", MOT, "text to show"), last=True)
 def _raise_text(ctx: Context, text: str) -> None:
     ctx.write(text)
-    ctx.fail(308, "raised by the script: {text}", text=text)
+    ctx.fail(308, "raised by the script")
 
 
 @ERRE.form(last=True)
