@@ -17,7 +17,7 @@ from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.pairs import facets_of_body
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.contact.status import solve_statuses
-from gibiane_ops.kernels.rigid import free_motions
+from gibiane_ops.kernels.rigid import FreeMotion, free_motions
 from gibiane_ops.kernels.solve import Factor, factorize
 from gibiane_ops.values.champs import DISCRET, ChPoint
 from gibiane_ops.values.failures import worded
@@ -153,7 +153,7 @@ def _check_held(ctx: Context, system: System, contact_rows: Any = None) -> None:
         return
     motions = free_motions(system.K, system.points, C)
     if motions:
-        shown = "; ".join(str(m) for m in motions[:3]) + ("; ..." if len(motions) > 3 else "")
+        shown = "; ".join(_motion(m) for m in motions[:3]) + ("; ..." if len(motions) > 3 else "")
         ctx.fail(
             "G404",
             "nothing stops {count} rigid motions: {motions}",
@@ -162,6 +162,13 @@ def _check_held(ctx: Context, system: System, contact_rows: Any = None) -> None:
             motions=shown,
             hint="hold the solid with BLOQ or SYMT, or join its contact conditions to the matrix",
         )
+
+
+def _motion(motion: FreeMotion) -> str:
+    """Name a free motion and the solid that makes it, counted from 1."""
+    who = " and ".join(f"solid {i + 1}" for i in motion.solids)
+    centre = ", ".join(f"{x:g}" for x in motion.centre)
+    return f"{who}, centred at ({centre}): {motion.movement}"
 
 
 def _contact(

@@ -77,12 +77,17 @@ class FreeMotion:
         along = np.abs(self.rotation[: len(self.translation)] @ self.translation) if len(self.translation) == 3 else 0.0
         return "screw" if along > 1e-6 * np.linalg.norm(self.rotation) else "rotation"
 
+    @property
+    def movement(self) -> str:
+        """Name the motion: ``translation along x``, ``rotation about z through (0, 0, 25)``."""
+        if self.kind == "translation":
+            return f"translation along {_direction(self.translation)}"
+        where = ", ".join(f"{x:g}" for x in self.axis_point)
+        return f"{self.kind} about {_direction(self.rotation)} through ({where})"
+
     def __str__(self) -> str:
         who = f"solid {self.solids[0]}" if len(self.solids) == 1 else f"solids {', '.join(map(str, self.solids))}"
-        if self.kind == "translation":
-            return f"{who}: translation along {_direction(self.translation)}"
-        where = ", ".join(f"{x:g}" for x in self.axis_point)
-        return f"{who}: {self.kind} about {_direction(self.rotation)} through ({where})"
+        return f"{who}: {self.movement}"
 
 
 def _direction(vector: FloatArray) -> str:
