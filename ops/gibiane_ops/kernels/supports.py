@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.errors import BadValue
@@ -69,3 +70,31 @@ def moved(shape: Shape, values: FloatArray, source: str, target: str) -> FloatAr
     if here.shape == there.shape and np.array_equal(here, there):
         return values
     return np.asarray(np.matmul(shape.N(there) @ np.linalg.pinv(shape.N(here)), values), np.float64)
+
+
+def integrals(shape: Shape, X: FloatArray, values: FloatArray, support: str) -> FloatArray:
+    """Integrate values over each element.
+
+    Parameters
+    ----------
+    shape : Shape
+    X : (m, n_nodes, space_dim) float64, length
+    values : (m, q, c) float64
+        At the points of `support`.
+    support : str
+        See `support_points`.
+
+    Returns
+    -------
+    (m, c) float64
+
+    Notes
+    -----
+    With the rule of the points where the values stand; nodal values are interpolated to the points of the mass rule.
+    """
+    at_points = support in ("RIGIDITE", "STRESSES") and values.shape[1] == len(shape.gauss[1])
+    rule = shape.gauss if at_points else shape.mass_gauss
+    if not at_points:
+        values = moved(shape, values, support, "MASSE")
+    weight = geometry.measure_densities(shape, X, rule[0]) * rule[1]
+    return np.asarray((weight[..., None] * values).sum(axis=1), np.float64)

@@ -6,7 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from gibiane_ops.kernels.topology import group_by_nodes
 from gibiane_ops.values.champs import INDETERMINE, ChamZone, ChPoint, MChaml, Part
+from gibiane_ops.values.modele import ModelZone
 from gibiane_ops.values.nodes import FloatArray
 
 SCAL, SCALAIRE = "SCAL", "SCALAIRE"
@@ -179,6 +181,23 @@ def chosen(field: Field, names: Sequence[str], new: Sequence[str] | None = None,
             columns = [zone.names.index(n) for n in kept]
             zones.append(ChamZone(zone.zone, [renamed[n] for n in kept], zone.values[:, :, columns]))
     return MChaml(zones, field.subtype, field.support)
+
+
+def restricted(field: MChaml, zone: ModelZone) -> ChamZone | None:
+    """Return the values of a field on a zone of another model, element by element; None if some have none."""
+    own = field.zone_of(zone)
+    if own is not None:
+        return own
+    for other in field.zones:
+        if not isinstance(other.zone, ModelZone) or other.zone.shape != zone.shape:
+            continue
+        group, _ = group_by_nodes(np.concatenate([other.zone.cells, zone.cells]))
+        row = np.full(int(group.max(initial=0)) + 1, -1, np.int64)
+        row[group[: len(other.values)]] = np.arange(len(other.values))
+        found = row[group[len(other.values) :]]
+        if (found >= 0).all():
+            return ChamZone(zone, other.names, other.values[found])
+    return None
 
 
 def joined(a: MChaml, b: MChaml) -> MChaml:

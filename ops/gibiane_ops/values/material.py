@@ -9,7 +9,7 @@ import numpy as np
 
 from gibiane.registry import Context
 from gibiane_ops.kernels import materials
-from gibiane_ops.values.algebra import Incompatible
+from gibiane_ops.values.algebra import Incompatible, restricted
 from gibiane_ops.values.champs import ChamZone, MChaml
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray
@@ -54,7 +54,7 @@ def solid_zones(ctx: Context, model: Modele, at: str = "model") -> list[ModelZon
 
 def on_zone(ctx: Context, field: MChaml, zone: ModelZone, at: str | None = None) -> ChamZone:
     """Return the values of a field on a zone of a model, or fail with error 565."""
-    found = field.zone_of(zone)
+    found = restricted(field, zone)
     if found is None:
         ctx.fail(
             565,

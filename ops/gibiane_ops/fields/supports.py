@@ -1,0 +1,325 @@
+"""Fields from one support to another: CHAN on fields, REDU, INTG, POIN on fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, extend, operator
+from gibiane.values import CHPOINT, FLOTTANT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT
+from gibiane_ops.kernels import geometry
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.recovery import nodal_mean
+from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
+from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, restricted
+from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
+from gibiane_ops.values.listes import ListMots
+from gibiane_ops.values.maillage import Block, Maillage, Point
+from gibiane_ops.values.material import on_zone, solid_zones
+from gibiane_ops.values.modele import Modele, ModelZone
+from gibiane_ops.values.nodes import FloatArray, node_store
+
+CHAN = extend("CHANGER")
+TYPE = Arg("subtype", MOT, "sub-type of the result", optional=True)
+
+
+@CHAN.form(
+    Key("CHPO", "a nodal field", required=True),
+    Arg("model", MMODEL, "model"),
+    Arg("field", MCHAML, "field"),
+    Key(("MOYE", "SOMM"), "mean of the elements (default), or their sum", name="how"),
+    gives=[CHPOINT],
+)
+def _to_nodes(ctx: Context, chpo: bool, model: Modele, field: MChaml, how: str | None) -> ChPoint:
+    store = node_store(ctx)
+    zones = [(z, on_zone(ctx, field, z, "field")) for z in solid_zones(ctx, model)]
+    parts = {}
+    for name in field.names:
+        having = [(z, v) for z, v in zones if name in v.names]
+        nodes = np.unique(np.concatenate([z.cells.ravel() for z, _ in having]))
+        cells = [np.searchsorted(nodes, z.cells) for z, _ in having]
+        values = [_at_nodes(z, v.component(name)[..., None], field) for z, v in having]
+        mean = nodal_mean(len(nodes), cells, values)[:, 0]
+        if how == "SOMM":
+            mean = mean * np.bincount(np.concatenate([c.ravel() for c in cells]), minlength=len(nodes))
+        parts[name] = (nodes, mean)
+    return ChPoint(store, parts, DIFFUS, field.title)
+
+
+def _at_nodes(zone: ModelZone, values: FloatArray, field: MChaml) -> FloatArray:
+    """Return the values of elements at their nodes: extended for a scalar field, their mean for others."""
+    if field.subtype == SCALAIRE or field.support == "NOEUD":
+        return moved(shape(zone.shape), values, field.support, "NOEUD")
+    return np.repeat(values.mean(axis=1, keepdims=True), zone.cells.shape[1], axis=1)
+
+
+@CHAN.form(
+    Key(SUPPORTS, "where the values shall stand", name="support", required=True),
+    Arg("model", MMODEL, "model"),
+    Arg("field", MCHAML, "field"),
+    TYPE,
+    gives=[MCHAML],
+)
+def _to_support(ctx: Context, support: str, model: Modele, field: MChaml, subtype: str | None) -> MChaml:
+    zones = []
+    for zone in solid_zones(ctx, model):
+        values = on_zone(ctx, field, zone, "field")
+        zones.append(ChamZone(zone, values.names, moved(shape(zone.shape), values.values, field.support, support)))
+    return MChaml(zones, subtype.strip() if subtype else field.subtype, support, field.title)
+
+
+@CHAN.form(
+    Key("CHAM", "an element field", required=True),
+    Arg("field", CHPOINT, "nodal field"),
+    Arg("model", MMODEL, "model"),
+    Key(SUPPORTS, "where the values shall stand (nodes)", name="support"),
+    TYPE,
+    gives=[MCHAML],
+)
+def _to_elements(
+    ctx: Context, cham: bool, field: ChPoint, model: Modele, support: str | None, subtype: str | None
+) -> MChaml:
+    zones = []
+    for zone in solid_zones(ctx, model):
+        nodal = field.table(field.names, zone.cells.ravel()).reshape(*zone.cells.shape, len(field.names))
+        zones.append(ChamZone(zone, field.names, moved(shape(zone.shape), nodal, "NOEUD", support or "NOEUD")))
+    return MChaml(zones, subtype.strip() if subtype else SCALAIRE, support or "NOEUD", field.title)
+
+
+@CHAN.form(
+    Key("TYPE", "another sub-type", required=True),
+    Arg("field", MCHAML, "field"),
+    Arg("subtype", MOT, "sub-type"),
+    gives=[MCHAML],
+)
+def _retyped(ctx: Context, type: bool, field: MChaml, subtype: str) -> MChaml:
+    return MChaml(field.zones, subtype.strip(), field.support, field.title)
+
+
+@CHAN.form(
+    Key("ATTRIBUT", "another nature", required=True),
+    Arg("field", CHPOINT, "field"),
+    Key("NATURE", "nature", Arg("nature", MOT), required=True),
+    gives=[CHPOINT],
+)
+def _renatured(ctx: Context, attribut: bool, field: ChPoint, nature: str) -> ChPoint:
+    known = {"INDE": "INDETERMINE", "DIFF": "DIFFUS", "DISC": "DISCRET"}.get(nature[:4].upper())
+    if known is None:
+        ctx.fail(7, "unknown nature '{nature}'; accepted: INDETERMINE, DIFFUS, DISCRET", at="nature", nature=nature)
+    return ChPoint(field.store, field.parts, known, field.title)
+
+
+@CHAN.form(
+    Key("TITRE", "another title", required=True),
+    Arg("field", CHPOINT, "field"),
+    Arg("text", MOT, "title"),
+    gives=[CHPOINT],
+)
+def _retitled(ctx: Context, titre: bool, field: ChPoint, text: str) -> ChPoint:
+    return ChPoint(field.store, field.parts, field.nature, text.strip())
+
+
+REDU = operator(
+    "REDUIRE",
+    topic="fields",
+    summary="a field or a model on a part of its support",
+    notice="`REDU CH G`: a nodal field on the nodes of a mesh, of a point or of another field; an element field on the "
+    "elements of a mesh or of a model; a model on the elements of a mesh. The elements of the mesh must be among "
+    "those of the field or model.",
+    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (0. 0.) (1. 0.) ; CH = COOR 1 L ;\nMESS (MAXI (REDU CH (L POIN 1))) ;",
+    see=["EXCO", "ELEM"],
+)
+
+
+@REDU.form(Arg("field", CHPOINT, "field"), Arg("where", (MAILLAGE, POINT), "where"), gives=[CHPOINT])
+def _on_mesh(ctx: Context, field: ChPoint, where: Maillage | Point) -> ChPoint:
+    nodes = where.nodes if isinstance(where, Maillage) else np.array([where.node])
+    return _limited(field, nodes)
+
+
+@REDU.form(Arg("field", CHPOINT, "field"), Arg("where", CHPOINT, "field that says where"), gives=[CHPOINT])
+def _on_field(ctx: Context, field: ChPoint, where: ChPoint) -> ChPoint:
+    kept = [nodes[values != 0] for nodes, values in where.parts.values()]
+    return _limited(field, np.unique(np.concatenate(kept)) if kept else np.zeros(0, np.int64))
+
+
+def _limited(field: ChPoint, nodes: Any) -> ChPoint:
+    parts = {}
+    for name, (own, values) in field.parts.items():
+        inside = np.isin(own, nodes)
+        if inside.any():
+            parts[name] = (own[inside], values[inside])
+    return ChPoint(field.store, parts, field.nature, field.title)
+
+
+def _part(ctx: Context, model: Modele, mesh: Maillage) -> Modele:
+    """Return a model on the elements of a mesh; every one must belong to the model."""
+    marks = [MChaml([ChamZone(z, [SCAL], np.zeros((len(z.cells), 1, 1)))], SCALAIRE, "GRAVITE") for z in model.zones]
+    zones = []
+    for block in mesh.blocks:
+        part = Maillage(mesh.store, [Block(block.shape, block.cells, block.colours)])
+        home = next(
+            (
+                z
+                for z, mark in zip(model.zones, marks, strict=True)
+                if restricted(mark, ModelZone(part, z.formulation, z.law, z.mode)) is not None
+            ),
+            None,
+        )
+        if home is None:
+            ctx.fail(
+                21, "some {shape} of the mesh are not elements of one zone of the model", at="mesh", shape=block.shape
+            )
+        zones.append(ModelZone(part, home.formulation, home.law, home.mode))
+    return Modele(zones)
+
+
+@REDU.form(Arg("model", MMODEL, "model"), Arg("mesh", MAILLAGE, "elements"), gives=[MMODEL])
+def _model(ctx: Context, model: Modele, mesh: Maillage) -> Modele:
+    return _part(ctx, model, mesh)
+
+
+@REDU.form(Arg("field", MCHAML, "element field"), Arg("model", MMODEL, "model"), gives=[MCHAML])
+def _on_model(ctx: Context, field: MChaml, model: Modele) -> MChaml:
+    zones = [on_zone(ctx, field, z, "field") for z in model.zones]
+    contacts = [found for c in model.contacts if (found := field.zone_of(c)) is not None]
+    return MChaml([*zones, *contacts], field.subtype, field.support, field.title)
+
+
+@REDU.form(Arg("field", MCHAML, "element field"), Arg("mesh", MAILLAGE, "elements"), gives=[MCHAML])
+def _on_elements(ctx: Context, field: MChaml, mesh: Maillage) -> MChaml:
+    whole = Modele([z.zone for z in field.zones if isinstance(z.zone, ModelZone)])
+    zones = [on_zone(ctx, field, z, "field") for z in _part(ctx, whole, mesh).zones]
+    return MChaml(zones, field.subtype, field.support, field.title)
+
+
+INTG = operator(
+    "INTG",
+    topic="fields",
+    summary="integral of an element field",
+    notice="`INTG MODL CH (c)`: the integral of the component c (of the only one) over the model; with 'ELEM' over "
+    "each element, an element field.",
+    example="""
+    OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0. 0.) (2. 0.)) TRAN 2 (0. 1.) ;
+    MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MESS (INTG MO (MANU 'CHML' MO 'SCAL' 3.)) ;
+    """,
+    see=["ENERGIE", "MANUEL"],
+)
+
+
+@INTG.form(
+    Arg("model", MMODEL, "model"),
+    Arg("field", MCHAML, "field"),
+    Key("ELEM", "over each element"),
+    Arg("name", MOT, "component", optional=True),
+    Arg("cara", MCHAML, "geometry of shells", optional=True),
+    gives=["FLOTTANT|MCHAML"],
+)
+def _intg(ctx: Context, model: Modele, field: MChaml, elem: bool, name: str | None, cara: MChaml | None) -> Any:
+    if name is None:
+        if len(field.names) != 1:
+            ctx.fail(
+                236,
+                "the field has {count} components ({known}): name the one to integrate",
+                at="field",
+                count=len(field.names),
+                known=" ".join(field.names),
+            )
+        name = field.names[0]
+    name = name.strip()
+    coords = node_store(ctx).coords
+    zones = []
+    for zone in solid_zones(ctx, model):
+        values = on_zone(ctx, field, zone, "field")
+        if name not in values.names:
+            ctx.fail(
+                236,
+                "the field has no component {name}; it has {known}",
+                at="name",
+                name=name,
+                known=" ".join(values.names),
+            )
+        corners = coords[zone.cells][..., : zone.dim]
+        total = integrals(shape(zone.shape), corners, values.component(name)[..., None], field.support)
+        zones.append(ChamZone(zone, [SCAL], total[:, None, :]))
+    if elem:
+        return MChaml(zones, SCALAIRE, "GRAVITE")
+    return float(sum(z.values.sum() for z in zones))
+
+
+POIN = extend("POINT")
+FIELD = (CHPOINT, MCHAML)
+TESTS: dict[str, Callable[[FloatArray, float], Any]] = {
+    "SUPERIEUR": np.greater,
+    "EGSUPE": np.greater_equal,
+    "EGALE": np.equal,
+    "EGINFE": np.less_equal,
+    "INFERIEUR": np.less,
+    "DIFFERENT": np.not_equal,
+}
+
+
+def _where(ctx: Context, field: Field, test: Callable[[FloatArray], Any], names: list[str]) -> Maillage:
+    """Return the nodes (or new points, for an element field) where some component passes a test."""
+    store = node_store(ctx)
+    if isinstance(field, ChPoint):
+        found = [nodes[test(values)] for name, (nodes, values) in field.parts.items() if name in names]
+        nodes = np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)
+    else:
+        points = [np.zeros((0, 3))]
+        for zone in field.zones:
+            if isinstance(zone.zone, ModelZone):
+                of = shape(zone.zone.shape)
+                passed = np.any([test(zone.component(n)) for n in zone.names if n in names], axis=0)
+                at = geometry.positions(of, store.coords[zone.zone.cells], support_points(of, field.support))
+                points.append(at[passed])
+        nodes = store.add(np.concatenate(points)) if sum(len(p) for p in points) else np.zeros(0, np.int64)
+    if not len(nodes):
+        ctx.warn(26, "no value of the field satisfies the condition: the mesh is empty", at="field")
+    return Maillage.of_nodes(store, nodes)
+
+
+@POIN.form(
+    Arg("field", FIELD, "field"),
+    Key(tuple(TESTS), "condition", Arg("x", FLOTTANT), name="test", required=True),
+    gives=[MAILLAGE],
+)
+def _points_test(ctx: Context, field: Field, test: tuple[str, float]) -> Maillage:
+    word, x = test
+    return _where(ctx, field, lambda v: TESTS[word](v, x), field.names)
+
+
+@POIN.form(
+    Arg("field", FIELD, "field"),
+    Key("COMPRIS", "between two values, included", Arg("low", FLOTTANT), Arg("high", FLOTTANT), required=True),
+    gives=[MAILLAGE],
+)
+def _points_between(ctx: Context, field: Field, compris: tuple[float, float]) -> Maillage:
+    low, high = compris
+    return _where(ctx, field, lambda v: (v >= low) & (v <= high), field.names)
+
+
+@POIN.form(
+    Arg("field", FIELD, "field"),
+    Key(("MAXI", "MINI"), "extreme value", name="which", required=True),
+    Key("ABS", "of the absolute values"),
+    Key(("AVEC", "SANS"), "components to keep or to drop", Arg("listed", LISTMOTS), name="names"),
+    gives=[MAILLAGE],
+)
+def _points_extreme(ctx: Context, field: Field, which: str, abs: bool, names: tuple[str, ListMots] | None) -> Maillage:
+    kept = field.names
+    if names is not None:
+        kept = [n for n in kept if (n in names[1].words) == (names[0] == "AVEC")]
+    measure: Callable[[FloatArray], FloatArray] = np.abs if abs else np.asarray
+    if isinstance(field, ChPoint):
+        arrays = [values for name, (_, values) in field.parts.items() if name in kept]
+    else:
+        arrays = [z.component(n).ravel() for z in field.zones for n in z.names if n in kept]
+    if not arrays or not sum(map(len, arrays)):
+        ctx.fail(21, "the field has no value", at="field")
+    every = measure(np.concatenate(arrays))
+    extreme = every.max() if which == "MAXI" else every.min()
+    return _where(ctx, field, lambda v: measure(v) == extreme, kept)
