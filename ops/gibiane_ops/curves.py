@@ -226,16 +226,17 @@ def _interpolated(
         if not isinstance(x, float):
             ctx.fail(37, "'TOUS' wants a FLOTTANT to interpolate at", at="tous")
         return ListReel(interpolation.crossings(x, xs, ys))
+    if len(xs) < 1 + spli:
+        ctx.fail(21, "a function of {count} points cannot be interpolated", count=len(xs))
     wanted = np.atleast_1d(np.asarray(x.values if isinstance(x, ListReel) else x, dtype=np.float64))
     try:
         found = interpolation.spline(wanted, xs, ys, dgau, ddro) if spli else interpolation.linear(wanted, xs, ys)
     except BadValue as failure:
         ctx.fail(
             249,
-            "this function cannot be interpolated: its {what} is {value}, {limit} is needed",
-            what=failure.what,
+            "the abscissae of the function must be in order, and {value} is not",
             value=failure.value,
-            limit=failure.limit,
+            hint="'TOUS' gives all values of a line that turns back",
         )
     return ListReel(found) if isinstance(x, ListReel) else float(found[0])
 

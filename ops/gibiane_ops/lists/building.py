@@ -23,6 +23,7 @@ from gibiane.values import (
     TABLE,
     Table,
 )
+from gibiane_ops.kernels.functions import FUNCTIONS
 from gibiane_ops.values.listes import AnyList, ListEnti, ListMots, ListReel
 
 LISTS = (LISTREEL, LISTENTI, LISTMOTS)
@@ -145,8 +146,18 @@ class _Builder:
 
     def _fitted_steps(self, first: float, step: float, last: float) -> None:
         exact = (last - first) / step if step else 0.0
-        steps = self._count(max(1, math.floor(exact + 0.5)) if math.isfinite(exact) else -1)
-        if abs(steps - exact) > 1e-6 * steps:
+        steps = self._count(math.floor(exact + 0.5) if math.isfinite(exact) else MAX_ITEMS + 1) if exact > 0 else 0
+        if steps == 0:
+            self.ctx.warn(
+                21,
+                "steps of {step:g} do not lead from {first:g} to {last:g}: {last:g} just follows",
+                level=0,
+                at="value",
+                step=step,
+                first=first,
+                last=last,
+            )
+        elif abs(steps - exact) > 1e-6 * steps:
             self.ctx.warn(
                 21,
                 "the step {step:g} does not divide the interval from {first:g} to {last:g}: {used:g} is used",
@@ -209,8 +220,8 @@ def _sine(
     values: list[float] | None,
     x: ListReel | None,
 ) -> ListReel:
-    angle = np.radians(360.0 * sinu * _abscissae(ctx, values, x) + (phas or 0.0))
-    return ListReel((1.0 if ampl is None else ampl) * np.sin(angle))
+    degrees = 360.0 * sinu * _abscissae(ctx, values, x) + (phas or 0.0)
+    return ListReel((1.0 if ampl is None else ampl) * FUNCTIONS["SIN"][0](degrees))
 
 
 def _abscissae(ctx: Context, values: list[float] | None, x: ListReel | None) -> NDArray[np.float64]:
