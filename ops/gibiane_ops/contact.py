@@ -21,7 +21,16 @@ COFR = operator(
     "traction, GN gap, GT1 GT2 slip, ETAT status (0 open, 1 stick, 2 slip). REA holds the contact "
     "forces, REAC RC U. Pressure and traction are nodal forces divided by the mass matrix of the "
     "facets, or by its row sums with 'LUMP'.",
-    example="INFO REAC ;",
+    example="OPTI DIME 2 ELEM QUA4 MODE PLAN DEFO ;\n"
+    "V1 = (DROI 2 (0 -1) (1 -1)) TRAN 2 (0 1) ; V2 = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
+    "G1 = CONT V1 ELEM 'APPU' 'STRI' (V1 POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"
+    "G2 = CONT V2 ELEM 'APPU' 'STRI' (V2 POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"
+    "MO = MODE (V1 ET V2) 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 1000. 'NU' 0.3 ;\n"
+    "MC = MODE G1 G2 'CONTACT' 'FROTTANT' 'COULOMB' ; MATC = MATE MC 'MU' 0.2 ; RC JC = RIGI MC MATC ;\n"
+    "CL = BLOQ 'DEPL' (V1 POIN 'DROI' (0 -1) (1 -1) 1.E-6) ;\n"
+    "F = FORC (0 -1) (V2 POIN 'DROI' (0 1) (1 1) 1.E-6) ;\n"
+    "U = RESO ((RIGI MO MA) ET CL ET RC) (F ET JC) ; CF = COFR MC MATC U (REAC RC U) ;\n"
+    "MESS 'largest pressure: ' (MAXI (EXCO 'PN' CF)) ;",
     see=["RESO", "REAC", "ERREUR"],
 )
 

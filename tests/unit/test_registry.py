@@ -1,0 +1,65 @@
+"""Every declared operator is documented, its example runs, and the table of families agrees with the declarations."""
+
+import io
+import os
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import gibiane_ops
+from gibiane import Session, registry
+from gibiane.notice import describe, operators
+from gibiane.registry import Operator
+
+Session(out=io.StringIO())
+EVERY = operators()
+BY_NAME = pytest.mark.parametrize("op", EVERY, ids=lambda op: op.name)
+
+
+@BY_NAME
+def test_is_documented(op: Operator) -> None:
+    assert op.summary
+    assert not op.summary.endswith(".")
+    assert op.notice
+    assert op.example
+    assert op.forms
+    text = describe(op)
+    assert text.startswith(f"{op.name}: {op.summary}")
+    for form in op.forms:
+        assert form.usage(op.name) in text
+
+
+@BY_NAME
+def test_example_runs(op: Operator, tmp_path: Path) -> None:
+    before = Path.cwd()
+    os.chdir(tmp_path)
+    try:
+        out = io.StringIO()
+        session = Session(out=out, err=out)
+        code = session.run_text(op.example, f"example of {op.name}")
+    finally:
+        os.chdir(before)
+    assert code == 0 or "OPTI ERRE IGNO" in op.example, out.getvalue()
+
+
+@BY_NAME
+def test_see_also_names_operators(op: Operator) -> None:
+    for name in op.see:
+        found = registry.find(name)
+        assert found is not None, name
+        assert name in (found.name, found.name[:4])
+
+
+def test_table_of_families_agrees_with_the_declarations() -> None:
+    modules = {m for names in gibiane_ops.OPERATORS.values() for m in names}
+    for module in modules:
+        import_module(module)
+    declared = {op.name for op in EVERY}
+    assert set(gibiane_ops.OPERATORS) <= declared
+    for name, homes in gibiane_ops.OPERATORS.items():
+        op = registry.find(name)
+        assert op is not None
+        homes_of_forms = {form.function.__module__ for form in op.forms}
+        assert set(homes) <= homes_of_forms, name
+        assert {m for m in homes_of_forms if m.startswith("gibiane_ops")} <= set(homes), name
