@@ -2,6 +2,9 @@
 
 Unknowns are numbered by node, ``d * node + component``. Blocks of cells come as ``(cells, element arrays)`` so that
 meshes of several shapes assemble in one call.
+
+Axisymmetric cells lie in a meridian plane (radius, height): the zz component is the hoop one, and integrals go once
+round the axis, with the factor 2 pi r. Forces, masses and energies are those of the whole body of revolution.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from gibiane_ops.kernels.elements.shape import Shape
 CHUNK = 1024
 
 
-def strain_operator(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
+def strain_operator(shape: Shape, X: FloatArray, xi: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
     """Build B, which gives the strains from the nodal displacements.
 
     Parameters
@@ -30,11 +33,14 @@ def strain_operator(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
         ``dim`` 2 (plane) or 3.
     X : (m, n_nodes, dim) float64, length
     xi : (q, dim) float64
+        Off the axis, where the hoop strain divides by the radius.
+    axisymmetric : bool
 
     Returns
     -------
     (m, q, n_strains, n_nodes * dim) float64, 1 / length
-        6 strains in 3D, 4 in a plane (the zz row is zero: eps_zz of plane stress follows from the material).
+        6 strains in 3D, 4 in a plane (the zz row is zero: eps_zz of plane stress follows from the material), or of a
+        body of revolution (zz is the hoop strain ``u_r / r``).
     """
     gradient, _ = geometry.gradients(shape, X, xi)
     m, q, n, dim = gradient.shape
@@ -42,19 +48,23 @@ def strain_operator(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
     for i in range(dim):
         for j in range(dim):
             B[:, :, component_of(i, j), :, i] = gradient[..., j]
+    if axisymmetric:
+        N = shape.N(xi)
+        B[:, :, component_of(2, 2), :, 0] = N / np.matmul(N, X[:, :, 0, None])
     return B.reshape(m, q, N_COMPONENTS[dim], n * dim)
 
 
-def element_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
+def element_stiffness(shape: Shape, X: FloatArray, D: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
     """Compute the stiffness matrices of cells.
 
     Parameters
     ----------
     shape : Shape
-        ``dim`` 2 (plane, unit thickness) or 3.
+        ``dim`` 2 (plane, unit thickness, or meridian plane) or 3.
     X : (m, n_nodes, dim) float64, length
     D : (n_strains, n_strains) or (m, n_strains, n_strains) float64, force / length^2, symmetric
         Hooke law, the same everywhere or one per cell; see `materials.isotropic`.
+    axisymmetric : bool
 
     Returns
     -------
@@ -77,6 +87,8 @@ def element_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
     """
     points, weights = shape.gauss
     geometry.check_cells(shape, X, points)
+    if axisymmetric:
+        return _ring_stiffness(shape, X, D)
     m, n, dim = X.shape
     law = _block_law(D, dim)
     K = np.empty((m, n, dim, n, dim))
@@ -91,6 +103,21 @@ def element_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
         blocks = np.matmul(pairs, law[part] if law.ndim == 3 else law)
         K[part] = blocks.reshape(-1, n, n, dim, dim).transpose(0, 1, 3, 2, 4)
     return K.reshape(m, n * dim, n * dim)
+
+
+def _ring_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
+    """Return the stiffness of axisymmetric cells: the hoop strain couples values with gradients, so B is formed."""
+    points, weights = shape.gauss
+    factor = geometry.measure_densities(shape, X, points) * geometry.circumferences(shape, X, points) * weights
+    K = np.empty((len(X), 2 * shape.n_nodes, 2 * shape.n_nodes))
+    for start in range(0, len(X), CHUNK):
+        part = slice(start, start + CHUNK)
+        B = strain_operator(shape, X[part], points, axisymmetric=True)
+        stress = np.matmul(D[part, None] if D.ndim == 3 else D, B) * factor[part, :, None, None]
+        size = (len(B), -1, B.shape[-1])
+        product = np.matmul(B.reshape(size).transpose(0, 2, 1), stress.reshape(size))
+        K[part] = (product + product.transpose(0, 2, 1)) / 2
+    return K
 
 
 def _block_law(D: FloatArray, dim: int) -> FloatArray:
@@ -201,7 +228,7 @@ def assemble_vector(n_nodes: int, d: int, blocks: Sequence[tuple[IntArray, Float
     return total
 
 
-def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray) -> FloatArray:
+def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
     """Compute the strains of a displacement field.
 
     Parameters
@@ -211,16 +238,22 @@ def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray) -> Float
     U : (m, n_nodes, dim) float64, length
         Nodal displacements of the cells.
     xi : (q, dim) float64
+        Off the axis, where the hoop strain divides by the radius.
+    axisymmetric : bool
 
     Returns
     -------
     (m, q, n_strains) float64
-        Engineering shears. In a plane eps_zz is 0; for plane stress take it from `materials.compliance`.
+        Engineering shears. In a plane eps_zz is 0; for plane stress take it from `materials.compliance`. In a body of
+        revolution it is the hoop strain ``u_r / r``.
     """
     gradient, _ = geometry.gradients(shape, X, xi)
     dim = X.shape[2]
     H = np.zeros((*gradient.shape[:2], 3, 3))
     H[..., :dim, :dim] = np.matmul(U.transpose(0, 2, 1)[:, None], gradient)
+    if axisymmetric:
+        N = shape.N(xi)
+        H[..., 2, 2] = (U[:, :, 0] @ N.T) / (X[:, :, 0] @ N.T)
     return strain_vector((H + H.swapaxes(-1, -2)) / 2, N_COMPONENTS[dim])
 
 
@@ -239,7 +272,7 @@ def stresses(strain: FloatArray, D: FloatArray) -> FloatArray:
     return np.asarray(strain @ D.swapaxes(-1, -2), np.float64)
 
 
-def internal_forces(shape: Shape, X: FloatArray, stress: FloatArray) -> FloatArray:
+def internal_forces(shape: Shape, X: FloatArray, stress: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
     """Compute the nodal forces that balance stresses given at the integration points.
 
     Parameters
@@ -248,6 +281,7 @@ def internal_forces(shape: Shape, X: FloatArray, stress: FloatArray) -> FloatArr
     X : (m, n_nodes, dim) float64, length
     stress : (m, q, n_strains) float64
         At the points of ``shape.gauss``.
+    axisymmetric : bool
 
     Returns
     -------
@@ -263,11 +297,18 @@ def internal_forces(shape: Shape, X: FloatArray, stress: FloatArray) -> FloatArr
     geometry.check_cells(shape, X, points)
     gradient, det = geometry.gradients(shape, X, points)
     dim = X.shape[2]
-    weighted = stress_tensor(stress)[..., :dim, :dim] * (det * weights)[..., None, None]
-    return np.asarray(np.matmul(gradient, weighted).sum(axis=1), np.float64)
+    factor = det * weights
+    if axisymmetric:
+        factor = factor * geometry.circumferences(shape, X, points)
+    tensor = stress_tensor(stress)
+    forces = np.matmul(gradient, tensor[..., :dim, :dim] * factor[..., None, None]).sum(axis=1)
+    if axisymmetric:
+        N = shape.N(points)
+        forces[..., 0] += (tensor[..., 2, 2] * factor / (X[:, :, 0] @ N.T)) @ N
+    return np.asarray(forces, np.float64)
 
 
-def pressure_load(face_shape: Shape, X: FloatArray, p: ArrayLike) -> FloatArray:
+def pressure_load(face_shape: Shape, X: FloatArray, p: ArrayLike, *, axisymmetric: bool = False) -> FloatArray:
     """Compute the consistent nodal forces of a pressure.
 
     Parameters
@@ -277,6 +318,7 @@ def pressure_load(face_shape: Shape, X: FloatArray, p: ArrayLike) -> FloatArray:
     X : (m, n_nodes, space_dim) float64, length
     p : scalar, (m,) or (m, n_nodes) float64, force / length^2
         Positive when it pushes on the solid; one value per facet, or nodal values that are interpolated.
+    axisymmetric : bool
 
     Returns
     -------
@@ -287,11 +329,13 @@ def pressure_load(face_shape: Shape, X: FloatArray, p: ArrayLike) -> FloatArray:
     N = face_shape.N(points)
     value = np.asarray(p, np.float64)
     at_points = value @ N.T if value.ndim == 2 else np.broadcast_to(value[..., None], (len(X), len(weights)))
+    if axisymmetric:
+        at_points = at_points * geometry.circumferences(face_shape, X, points)
     flux = geometry.normal_densities(face_shape, X, points) * (at_points * weights)[..., None]
     return np.asarray(-np.matmul(N.T, flux), np.float64)
 
 
-def distributed_load(shape: Shape, X: FloatArray, density: ArrayLike) -> FloatArray:
+def distributed_load(shape: Shape, X: FloatArray, density: ArrayLike, *, axisymmetric: bool = False) -> FloatArray:
     """Compute the consistent nodal forces of a force per unit of length, area or volume.
 
     Parameters
@@ -301,21 +345,29 @@ def distributed_load(shape: Shape, X: FloatArray, density: ArrayLike) -> FloatAr
     X : (m, n_nodes, space_dim) float64, length
     density : (d,), (m, d) or (m, n_nodes, d) float64
         Uniform, per cell, or nodal values that are interpolated.
+    axisymmetric : bool
 
     Returns
     -------
     (m, n_nodes, d) float64, force
         ``F_a = int N_a t``.
     """
-    points, weights = shape.mass_gauss
+    points = shape.mass_gauss[0]
     N = shape.N(points)
     value = np.asarray(density, np.float64)
     at_points = np.matmul(N, value) if value.ndim == 3 else np.atleast_2d(value)[:, None, :]
-    factor = geometry.measure_densities(shape, X, points) * weights
+    factor = _mass_weights(shape, X, axisymmetric)
     return np.asarray(np.matmul(N.T, at_points * factor[..., None]), np.float64)
 
 
-def element_mass(shape: Shape, X: FloatArray, density: ArrayLike = 1.0) -> FloatArray:
+def _mass_weights(shape: Shape, X: FloatArray, axisymmetric: bool) -> FloatArray:
+    """Return the measures that the points of the mass rule stand for, (m, q)."""
+    points, weights = shape.mass_gauss
+    factor = geometry.measure_densities(shape, X, points) * weights
+    return factor * geometry.circumferences(shape, X, points) if axisymmetric else factor
+
+
+def element_mass(shape: Shape, X: FloatArray, density: ArrayLike = 1.0, *, axisymmetric: bool = False) -> FloatArray:
     """Compute the consistent mass matrices of one scalar component.
 
     Parameters
@@ -324,17 +376,49 @@ def element_mass(shape: Shape, X: FloatArray, density: ArrayLike = 1.0) -> Float
         Any shape.
     X : (m, n_nodes, space_dim) float64, length
     density : scalar or (m,) float64
+    axisymmetric : bool
 
     Returns
     -------
     (m, n_nodes, n_nodes) float64, symmetric
         ``M_ab = int density N_a N_b``; every displacement component has the same.
     """
-    points, weights = shape.mass_gauss
-    N = shape.N(points)
-    factor = geometry.measure_densities(shape, X, points) * weights * np.asarray(density, np.float64)[..., None]
-    products = (N[:, :, None] * N[:, None, :]).reshape(len(weights), -1)
+    N = shape.N(shape.mass_gauss[0])
+    factor = _mass_weights(shape, X, axisymmetric) * np.asarray(density, np.float64)[..., None]
+    products = (N[:, :, None] * N[:, None, :]).reshape(len(N), -1)
     return (factor @ products).reshape(len(X), shape.n_nodes, shape.n_nodes)
+
+
+def lumped_mass(shape: Shape, X: FloatArray, density: ArrayLike = 1.0, *, axisymmetric: bool = False) -> FloatArray:
+    """Compute diagonal mass matrices of one scalar component.
+
+    Parameters
+    ----------
+    shape : Shape
+    X : (m, n_nodes, space_dim) float64, length
+    density : scalar or (m,) float64
+    axisymmetric : bool
+
+    Returns
+    -------
+    (m, n_nodes) float64, positive
+        Their sum is the mass of the cell.
+
+    Notes
+    -----
+    Sums of the rows of the consistent matrix for linear shapes. In those of second degree such sums are zero or
+    negative at corners: there the diagonal of the consistent matrix is scaled to the mass of the cell.
+
+    Source
+    ------
+    Hinton, Rock, Zienkiewicz 1976.
+    """
+    M = element_mass(shape, X, density, axisymmetric=axisymmetric)
+    if shape.degree < 2:
+        return np.asarray(M.sum(axis=2), np.float64)
+    diagonal = np.diagonal(M, axis1=1, axis2=2)
+    total: FloatArray = diagonal * (M.sum(axis=(1, 2)) / diagonal.sum(axis=1))[:, None]
+    return total
 
 
 def face_mass(face_shape: Shape, X: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.elements.shape import Shape
-from gibiane_ops.kernels.errors import InvertedElement
+from gibiane_ops.kernels.errors import BadValue, InvertedElement
 
 # A jacobian below this share of the product of its column lengths is a flat cell seen through round-off.
 FLAT = 1e-12
@@ -92,6 +92,32 @@ def measure_densities(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray
         return _determinants(J)
     gram = np.matmul(J.swapaxes(-1, -2), J)
     return np.asarray(np.sqrt(np.maximum(_determinants(gram), 0.0)), np.float64)
+
+
+def circumferences(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
+    """Compute the length of the circles that points of a meridian plane describe about the axis.
+
+    Parameters
+    ----------
+    shape : Shape
+    X : (m, n_nodes, 2) float64, length
+        Radius and height.
+    xi : (q, dim) float64
+
+    Returns
+    -------
+    (m, q) float64, length
+        ``2 pi r``: an integral over the meridian plane times this one is an integral over the body of revolution.
+
+    Raises
+    ------
+    BadValue
+        When a node has a negative radius.
+    """
+    radius = X[:, :, 0]
+    if radius.size and radius.min() < -FLAT * np.abs(X).max():
+        raise BadValue("radius of a node", float(radius.min()), "r >= 0 in an axisymmetric model")
+    return np.asarray(2 * np.pi * (radius @ shape.N(xi).T), np.float64)
 
 
 def check_cells(shape: Shape, X: FloatArray, xi: FloatArray | None = None) -> FloatArray:
