@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from gibiane.diagnostics import GibianeError, Label, Text, make, nearest
+from gibiane.diagnostics import Diagnostic, GibianeError, Label, Text, make, nearest
 from gibiane.forms import Arg, Form, Key
 from gibiane.nodes import Literal, Name, Node
 from gibiane.source import SourceText, Span
@@ -88,7 +88,7 @@ class Operands:
         node = self.nodes[i]
         if isinstance(node, Literal) and node.quoted:
             return False
-        return self.session.operator(self.values[i]) is not None
+        return isinstance(self.values[i], str) and self.session.operator(self.values[i]) is not None
 
     def read(self, types: str | Sequence[str], *, subtype: str | None = None) -> Any:
         """Read the leftmost value of `types`, or return None when there is none (see `need`)."""
@@ -117,13 +117,27 @@ class Operands:
             label = self.describe(0, wanted)
             labels, span = [label], label.span
         template = "no {type} among its operands" if what is None else "no {type} for {what}"
-        return GibianeError(make(37, template, type=wanted, what=what, labels=labels, span=span))
+        failure = make(37, template, type=wanted, what=what, labels=labels, span=span)
+        self.point_at_word(failure)
+        return GibianeError(failure)
+
+    def point_at_word(self, failure: Diagnostic) -> None:
+        """Add to an error the unread word that nothing has and that hides what follows, with a likely correction."""
+        i = self.first_word()
+        node = self.nodes[i] if i >= 0 else None
+        if not isinstance(node, Name) or self.values[i] != node.word or self.is_operator_word(i):
+            return
+        if i > 0:
+            failure.labels.append(self.describe(i))
+        close = nearest(node.word, [*self.session.names(), *self.session.library.names()])
+        if close is not None:
+            failure.hint = Text("did you mean {close}?", {"close": close})
 
     def describe(self, i: int, wanted: str | None = None) -> Label:
         """Return a label that says what operand `i` is, and what was wanted instead."""
         value, node = self.values[i], self.nodes[i]
         kind = type_of(value)
-        fields: dict[str, Any] = {"type": kind, "wanted": wanted, "word": value if kind == MOT else ""}
+        fields: dict[str, Any] = {"type": kind, "word": value if kind == MOT else ""}
         if kind == MOT and isinstance(node, Name) and value == node.word:
             text = "the word {word}: no object has this name"
         elif kind == MOT:
@@ -136,9 +150,10 @@ class Operands:
             text, fields["line"] = "a {type}, made at line {line}", line
         else:
             text = "a {type}"
+        told = Text(text, fields)
         if wanted is not None:
-            text += "; a {wanted} is needed here"
-        return Label(self.span(node), Text(text, fields))
+            told = Text("{what}; a {wanted} is needed here", {"what": told, "wanted": wanted})
+        return Label(self.span(node), told)
 
     def read_keyword(self, words: Sequence[str], width: int = 4) -> str | None:
         """Read one of `words` if it is the first unread word (compared on `width` letters), else return None."""
@@ -174,6 +189,8 @@ class Operands:
         value = self.values[i]
         word = value if isinstance(value, str) else value.name
         close = nearest(word[:8], list(words))
+        if close is None and (short := nearest(word[:4], [w[:4] for w in words])) is not None:
+            close = next(w for w in words if w[:4] == short)
         return GibianeError(make(7, "unknown keyword '{word}'; accepted: {accepted}", word=word, accepted=accepted,
                                  span=self.span(self.nodes[i]), hint="did you mean '{close}'?" if close else None,
                                  close=close))
@@ -308,10 +325,9 @@ def explain(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeE
     i = q.first_word()
     if operator.symbolic:
         failure = _explain_infix(operator, misses, q)
-        if failure.diagnostic.code != "196":
-            forms = []  # with one operand, or none, what every type of operands gives is of no help
-    elif i >= 0 and best.keys and isinstance(q.values[i], str) and not q.is_operator_word(i):
-        keys = sorted({w for m in misses for w in m.keys})
+        forms = []  # what every type of operands gives is of no help for two of them
+    elif i >= 0 and best.keys and isinstance(q.values[i], str) and not q.is_operator_word(i) and not _is_misspelt_name(
+            q, i, best, keys := sorted({w for m in misses for w in m.keys})):
         failure = q.unknown_keyword(keys)
     elif isinstance(best.wanted, Key):
         words = " or ".join(f"'{w}'" for w in best.wanted.words)
@@ -323,6 +339,14 @@ def explain(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeE
     failure.diagnostic.forms = forms
     failure.diagnostic.more = f"INFO {operator.name} ;"
     return failure
+
+
+def _is_misspelt_name(q: Operands, i: int, best: Mismatch, keys: Sequence[str]) -> bool:
+    """Say whether an unread word stands for a missing operand rather than for a keyword."""
+    node = q.nodes[i]
+    if not isinstance(best.wanted, Arg) or not isinstance(node, Name) or q.values[i] != node.word:
+        return False
+    return nearest(node.word[:8], keys) is None or nearest(node.word, list(q.session.names())) is not None
 
 
 def _explain_infix(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeError:
@@ -340,9 +364,11 @@ def _explain_infix(operator: Operator, misses: list[Mismatch], q: Operands) -> G
         labels = [q.describe(0)]
         hint = "two operands are wanted" if operator.name not in "+-" else (
             "two operands are wanted; a sign belongs to a number only: write -1 * X")
-        if len(q.values) > 1:
+        if len(q.values) > 1 and not isinstance(q.nodes[1], Name):
             labels.append(q.describe(1))
-        return GibianeError(make(37, "its second operand is missing", labels=labels, span=labels[0].span, hint=hint))
+        failure = make(37, "its second operand is missing", labels=labels, span=labels[0].span, hint=hint)
+        q.point_at_word(failure)
+        return GibianeError(failure)
     labels = [q.describe(0)] if q.values else []
     return GibianeError(make(533, "its operands are missing", labels=labels, span=labels[0].span if labels else None))
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from gibiane import compiled, procedures
+from gibiane import faults, compiled, procedures
 from gibiane.blocks import block_name, block_names
-from gibiane.diagnostics import GibianeError, make
+from gibiane.diagnostics import GibianeError, Label, Text, make
 from gibiane.frames import Frame, Loop, Stop
 from gibiane.nodes import Instr, Literal, Name, Node
 from gibiane.values import LOGIQUE
@@ -66,11 +66,13 @@ def _condition_by_queue(ev: Evaluator, instr: Instr) -> bool:
         failure = q.missing(LOGIQUE)
         failure.diagnostic.operator = "SI"
         failure.diagnostic.forms = ["SI LOGIQUE ;"]
+        if len(q.values) > 1:
+            failure.diagnostic.hint = Text("put the whole condition between parentheses")
         raise failure
     if q.values:
-        failure = ev.leftover(q, 0)
+        failure = faults.leftover(ev, q, 0)
         failure.diagnostic.operator = "SI"
-        failure.diagnostic.hint = make(11, "", hint="put the whole condition between parentheses").hint
+        failure.diagnostic.hint = Text("put the whole condition between parentheses")
         raise failure
     return bool(condition)
 
@@ -97,6 +99,7 @@ def _repeat(ev: Evaluator, program: list[Instr], pc: int) -> int:
         raise GibianeError(make(533, "a loop needs a name", operator="REPETER", span=instr.span(),
                                 hint="REPE B1 10 ; ... FIN B1 ;"))
     if instr.jump is None:
+        _refuse_crossed_loop(program, pc, names)
         raise GibianeError(make(1023, "this REPETER is never closed", operator="REPETER", span=instr.span(),
                                 hint="write FIN {name} ;", name=names[0]))
     name = block_name(program[instr.jump]) or names[0]
@@ -122,6 +125,16 @@ def _repeat(ev: Evaluator, program: list[Instr], pc: int) -> int:
     frame.loops.append(Loop(name, program, pc, instr.jump, -1 if count is None else count))
     frame.names["&" + name[:23]] = 1
     return pc + 1
+
+
+def _refuse_crossed_loop(program: list[Instr], pc: int, names: list[str]) -> None:
+    """Tell of a FIN that closes this loop outside the loop that contains it."""
+    for instr in program[pc + 1 :]:
+        if instr.head == "FIN" and block_name(instr) in names:
+            span, end = program[pc].span(), instr.span()
+            labels = [Label(span, Text("opened inside another loop")), Label(end, Text("closed outside it"))]
+            raise GibianeError(make(154, "loops are closed in the wrong order", operator="FIN", span=end, labels=labels,
+                                    hint="close the loops from the inside out"))
 
 
 def _end(ev: Evaluator, program: list[Instr], pc: int) -> int:
@@ -179,7 +192,7 @@ def _define(ev: Evaluator, program: list[Instr], pc: int) -> int:
 
 
 def _end_procedure(_ev: Evaluator, program: list[Instr], pc: int) -> int:
-    raise GibianeError(make(153, "FINPROC without a DEBPROC before it", operator="FINPROC", span=program[pc].span()))
+    raise GibianeError(make(153, "no DEBPROC stands before it", operator="FINPROC", span=program[pc].span()))
 
 
 def _arguments(ev: Evaluator, program: list[Instr], pc: int) -> int:
@@ -190,7 +203,7 @@ def _arguments(ev: Evaluator, program: list[Instr], pc: int) -> int:
 def _respond(ev: Evaluator, program: list[Instr], pc: int) -> int:
     instr = program[pc]
     if ev.frame.procedure is None:
-        raise GibianeError(make(153, "RESPRO stands inside a procedure only", operator="RESPRO", span=instr.span()))
+        raise GibianeError(make(153, "it stands inside a procedure only", operator="RESPRO", span=instr.span()))
     ev.frame.results.extend(procedures.results_of(ev, instr, _without_head(instr)))
     return pc + 1
 

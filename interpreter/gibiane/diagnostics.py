@@ -167,15 +167,22 @@ def render(diag: Diagnostic, *, colour: bool = False, lang: str = "en") -> str:
         lines.append(f"{margin} {paint('=', 'blue')} {word('hint')}: {diag.hint.render(lang)}")
     if diag.more:
         lines.append(f"{margin} {paint('=', 'blue')} {word('more')}: {diag.more}")
-    for name, span in _shortened(diag.trace):
-        where = "..." if span is None else f"{name} ({span.source.name}:{span.line})"
+    for where in _calls(diag.trace):
         lines.append(f"{margin} {paint('=', 'blue')} {word('in')}: {where}")
     return "\n".join(lines)
 
 
-def _shortened(trace: list[tuple[str, Span]]) -> list[tuple[str, Span | None]]:
-    shown: list[tuple[str, Span | None]] = list(trace)
-    return shown if len(shown) <= 12 else [*shown[:6], ("", None), *shown[-5:]]
+def _calls(trace: list[tuple[str, Span]]) -> list[str]:
+    """Return the calls from inner to outer, equal ones in a row counted, a long chain cut in its middle."""
+    counted: list[list[Any]] = []
+    for name, span in trace:
+        where = f"{name} ({span.source.name}:{span.line})"
+        if counted and counted[-1][0] == where:
+            counted[-1][1] += 1
+        else:
+            counted.append([where, 1])
+    shown = [where if count == 1 else f"{where} x {count}" for where, count in counted]
+    return shown if len(shown) <= 12 else [*shown[:6], "...", *shown[-5:]]
 
 
 def _excerpt(labels: Sequence[Label], margin: str, lang: str, paint: Any) -> list[str]:
@@ -208,7 +215,7 @@ def nearest(word: str, known: Sequence[str], limit: int = 2) -> str | None:
         distance = _edits(upper, candidate.upper(), best_distance)
         if distance < best_distance:
             best, best_distance = candidate, distance
-    return best if best_distance <= min(limit, max(1, len(upper) // 3)) else None
+    return best if best_distance <= min(limit, len(upper) // 3) else None
 
 
 def _edits(a: str, b: str, stop: int) -> int:

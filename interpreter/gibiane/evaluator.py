@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gibiane import compiled, control, objects, procedures, slips
+from gibiane import compiled, control, faults, objects, procedures, slips
 from gibiane.binding import ABSENT, DOT, PERCENT, Mark, Operands
 from gibiane.diagnostics import FATAL, GibianeError, Label, Text, make, nearest
 from gibiane.frames import Frame
 from gibiane.nodes import Access, Group, Instr, Literal, Name, Node, Target
-from gibiane.registry import Operator, find, names
+from gibiane.registry import Operator, find
 from gibiane.source import SourceText, Span
 from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Procedure, Table, Texte, type_of
 
@@ -128,13 +128,14 @@ class Evaluator:
         targets = instr.targets
         if not targets:
             if len(q.values) > 1:
-                raise self.leftover(q, 1)
+                raise faults.leftover(self, q, 1)
             if len(q.values) == 1 and self.session.options["WARN"]:
-                self._warn_lonely_word(q)
+                faults.warn_lonely_word(self, q)
             return
+        full = Operands(self.session, q.source, q.values[:], q.nodes[:]) if len(q.values) > len(targets) else None
         results = [self._result_for(target, q, instr) for target in targets]
         if q.values:
-            raise self.leftover(q, 0)
+            raise faults.leftover(self, q, 0, full)
         for target, value in zip(targets, results, strict=True):
             self.assign(target, value, instr)
 
@@ -148,9 +149,8 @@ class Evaluator:
             raise GibianeError(make(37, "no {type} among the results for {name}", type=target.type_name,
                                     name=target.name, span=instr.at(target), labels=label))
         if q.values and isinstance(q.values[0], Mark):
-            raise self.stray_access(q, 0)
-        raise GibianeError(make(37, "no result is left for {name}", name=target.name, span=instr.at(target),
-                                hint="the right side gives fewer results than there are names"))
+            raise faults.stray_access(self, q, 0)
+        raise faults.no_result(self, target, instr)
 
     def assign(self, target: Target, value: Any, instr: Instr) -> None:
         """Bind a value to a target: a name, a table element, or an attribute of an object."""
@@ -160,16 +160,13 @@ class Evaluator:
         if not target.path:
             self.assign_name(target.name, value, instr)
             if self.session.options["WARN"]:
-                self._warn_hidden_operator(target, instr)
+                faults.warn_hidden_operator(self, target, instr)
             return
         container = (objects.attribute(self, target.name, instr.at(target)) if target.member
                      else self.frame.lookup(target.name))
         for step, (_, index) in enumerate(target.path):
             if not isinstance(container, Table):
-                shown = type_of(container) if container is not ABSENT else "MOT"
-                raise GibianeError(make(
-                    315, "{name} is a {type}, not a TABLE: it has no elements to assign", name=target.name,
-                    type=shown, span=instr.at(target), hint="make the table first: {name} = TABL ;"))
+                raise faults.no_table(self, target, step, container, instr)
             key = self.index_value(instr.source, index)
             if step == len(target.path) - 1:
                 container.set(key, value)
@@ -233,7 +230,7 @@ class Evaluator:
         if not q.values:
             return ABSENT
         if len(q.values) > 1:
-            raise self.leftover(q, 1)
+            raise faults.leftover(self, q, 1)
         return q.values[0]
 
     def evaluate(self, q: Operands, n_targets: int) -> None:
@@ -258,6 +255,8 @@ class Evaluator:
                     procedures.call(self, procedure, q, node)
                     continue
                 break
+            if self.session.options["WARN"]:
+                faults.warn_traps(self, op, q, i)
             del q.values[i], q.nodes[i]
             if op.symbolic and self.closures and compiled.reduce_front(op.name, q.values, q.nodes, node):
                 continue
@@ -328,70 +327,6 @@ class Evaluator:
                 q.nodes[i : i + 1] = [node] * len(inner.values)
                 return True
         return False
-
-    # -- what is wrong -------------------------------------------------------------------------------------
-
-    def stray_access(self, q: Operands, i: int) -> GibianeError:
-        """Return the error for a separator whose left side has no elements."""
-        if i:
-            label = q.describe(i - 1)
-            return GibianeError(make(11, "only a TABLE has elements", labels=[label], span=label.span))
-        return GibianeError(make(11, "nothing stands before this separator", span=q.span(q.nodes[i])))
-
-    def leftover(self, q: Operands, used: int) -> GibianeError:
-        """Return the error 11 for the first value that nothing has read."""
-        for i, value in enumerate(q.values):
-            if isinstance(value, Mark):
-                return self.stray_access(q, i)
-        at = min(used, len(q.values) - 1)
-        word = q.first_word()
-        if word >= 0 and isinstance(q.values[word], str) and isinstance(q.nodes[word], Name | Literal):
-            at = word
-        label = q.describe(at)
-        value, node = q.values[at], q.nodes[at]
-        hint, close = None, None
-        unknown = self._unknown_word()
-        if isinstance(value, str) and isinstance(node, Name) and value == node.word and q.is_operator_word(at):
-            label = Label(label.span, Text("the operator {word} is not run: a word stands before it", {"word": value}))
-            hint = "words follow their operator: ET 'abc' 'def', EGA X 'WORD'"
-        elif isinstance(value, str) and isinstance(node, Name) and value == node.word:
-            known = [*names(), *self.session.names(), *self.session.library.names()]
-            close = nearest(value, known)
-            hint = "did you mean {close}?" if close else (
-                "no operator, procedure or object has this name: is it misspelt, or defined later?")
-        elif isinstance(value, str) and find(value) is not None:
-            hint = "an operator that follows EXTR, TYPE, CHAI, MOT, LIST or VALE needs parentheses around these"
-        elif unknown is not None:
-            close = nearest(unknown, [*names(), *self.session.names(), *self.session.library.names()])
-            hint = "nothing is named {unknown}: did you mean {close}?" if close else (
-                "no operator, procedure or object is named {unknown}: is it misspelt, or defined later?")
-        elif len(q.values) > 1 and all(type_of(v) in (ENTIER, FLOTTANT) for v in q.values):
-            hint = "an operator is missing between the values, or a ; between two instructions"
-        return GibianeError(make(11, "a result of type {type} is left over", type=type_of(value), labels=[label],
-                                 span=label.span, hint=hint, close=close, unknown=unknown))
-
-    def _unknown_word(self) -> str | None:
-        """Return the first word of the current instruction if nothing has this name: a misspelt operator, perhaps."""
-        item = next((i for i in self.current.items if isinstance(i, Name)), None) if self.current else None
-        if item is None or self.frame.lookup(item.name) is not ABSENT or find(item.word) is not None:
-            return None
-        return item.word
-
-    def _warn_lonely_word(self, q: Operands) -> None:
-        node = q.nodes[0]
-        if isinstance(node, Name) and q.values[0] == node.word:
-            known = [*names(), *self.session.names()]
-            close = nearest(node.word, known)
-            self.session.emit(make("G301", "the word {word} does nothing: no object or operator has this name",
-                                   word=node.word, span=q.span(node), close=close,
-                                   hint="did you mean {close}?" if close else None))
-
-    def _warn_hidden_operator(self, target: Target, instr: Instr) -> None:
-        op = find(target.name)
-        if op is not None and len(target.name) >= min(4, len(op.name)):
-            self.session.emit(make("G301", "the name {name} now hides the operator {operator}", name=target.name,
-                                   operator=op.name, span=instr.at(target),
-                                   hint="quote the operator to call it all the same: '{short}'", short=op.name[:4]))
 
     # -- procedures ------------------------------------------------------------------------------------------
 

@@ -146,4 +146,6 @@ def _hint_for(char: str) -> str:
         return "lists are made by an operator (PROG, LECT, MOTS), groups with parentheses"
     if char == ":":
         return "nothing in the language uses it outside a string"
+    if char.isalpha():
+        return "names are written without accents"
     return "put it inside a string between apostrophes, or remove it"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from typing import Any
 
-from gibiane import registry
+from gibiane import cast3m, registry
 from gibiane.diagnostics import nearest
 from gibiane.registry import Context, Operator
 
@@ -40,9 +40,13 @@ def notice(ctx: Context, word: str, node: Any) -> str:
     op = registry.find(word)
     if op is not None:
         return describe(op)
-    known = registry.names()
-    close = nearest(word, known)
     ctx.places["word"] = node
+    missing = cast3m.lacks(word)
+    if missing is not None:
+        name, near = missing
+        ctx.fail(251, "{name} of Cast3M is not available yet", at="word", name=name, near=near,
+                 hint="the nearest thing here: {near}" if near else None)
+    close = nearest(word, registry.spellings())
     ctx.fail(9, "there is no operator {word}", at="word", word=word, close=close,
              hint="did you mean {close}?" if close else "gibiane docs lists the operators")
 

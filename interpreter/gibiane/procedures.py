@@ -199,7 +199,7 @@ def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, pr
             what = parameter.type_name or "value"
             if parameter.subtype:
                 what = f"{what} {parameter.subtype}"
-            labels = [q.describe(0, parameter.type_name)] if q.values else []
+            labels = [q.describe(0, what)] if q.values else []
             diag = make(1121, "argument {argument} is missing: a {what} is wanted", argument=parameter.name, what=what,
                         operator=procedure.name, span=labels[0].span if labels else span, labels=labels)
             diag.forms = [usage(procedure)]
@@ -215,6 +215,7 @@ def usage(procedure: Procedure) -> str:
     parts = []
     for p in procedure.parameters:
         text = f"{p.name.lower()}:{p.type_name}" if p.type_name else p.name.lower()
+        text += f" '{p.subtype}'" if p.subtype else ""
         parts.append(f"({text})" if p.optional else text)
     return " ".join([procedure.name, *parts, ";"])
 
@@ -240,7 +241,7 @@ def read_arguments(ev: Evaluator, instr: Instr, items: list[Node]) -> None:
     """Run ARGU: read more arguments from what is still unread in the caller's queue."""
     frame = ev.frame
     if frame.procedure is None:
-        raise GibianeError(make(153, "ARGUMENT stands inside a procedure only", operator="ARGUMENT",
+        raise GibianeError(make(153, "it stands inside a procedure only", operator="ARGUMENT",
                                 span=instr.span()))
     unread = frame.arguments or Operands(ev.session, instr.source, [], [])
     for parameter in parameters(instr, items):

@@ -250,6 +250,12 @@ def names() -> list[str]:
     return sorted({op.name for op in CATALOGUE.values()} | set(LONG) | set(_MODULES))
 
 
+def spellings() -> list[str]:
+    """Return every way of writing an operator that hints may propose: full names and their four letters."""
+    full = [name for name in names() if len(name) > 2]
+    return [*full, *(name[:4] for name in full if name not in WHOLE_NAMES and len(name) > 4)]
+
+
 @lru_cache(maxsize=4096)
 def _find_cached(word: str) -> Operator | None:
     key = word[:4].rstrip()

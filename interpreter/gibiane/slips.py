@@ -234,11 +234,11 @@ def _crowded_head(instr: Instr, held: list[Token]) -> Diagnostic | None:
     room = _ROOM.get(str(instr.head))
     if room is None or any(t.type == "EQUAL" for t in held):
         return None
-    units = [t for t in _units(held) if t.type != "SYMBOL" or room == 0]
+    units = _units(held)
+    if room and any(t.type == "SYMBOL" or _word(t) in _CONNECT for t in units):
+        return None  # `SI A > B`: a fault of another kind, told when it runs
     if len(units) > room + 1 and _word(units[0])[:4] == instr.head:
         extra = units[room + 1]
-        if _word(extra) in _CONNECT:
-            return None  # `SI A EGA B`: a fault of another kind, told when it runs
         return _report(instr, held[held.index(extra) - 1], extra)
     return None
 

@@ -66,8 +66,9 @@ def _power(ctx: Context, a: Any, b: Any) -> Any:
     if a == 0 and b < 0:
         ctx.fail(26, "zero to a negative power", at="a")
     if type(b) is float and a <= 0:
-        ctx.fail(213, "a real power of a number that is not positive ({a} ** {b})", at="a", a=a, b=b,
-                 hint="an ENTIER exponent is allowed: {a} ** {whole}", whole=int(b))
+        hint = "an ENTIER exponent is allowed: {a} ** {whole}" if b == int(b) else "ABS gives the absolute value"
+        ctx.fail(213, "a real power of a number that is not positive ({a} ** {b})", at="a", a=a, b=b, hint=hint,
+                 whole=int(b))
     if type(a) is int and type(b) is int and b > 0 and abs(a) > 1 and b * math.log2(abs(a)) > 100_000:
         ctx.fail(26, "{a} ** {b} is too large", at="b", a=a, b=b)
     try:

@@ -35,7 +35,7 @@ def _declare(name: str, summary: str, syntax: str, example: str) -> Operator:
 
     @op.stream(syntax=syntax)
     def _misplaced(ctx: Context, q: Operands) -> None:
-        ctx.fail(153, "{name} must be the first word of an instruction", name=name,
+        ctx.fail(153, "it must be the first word of an instruction",
                  hint="is the ; of the instruction before it missing?")
 
     return op

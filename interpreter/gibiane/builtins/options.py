@@ -127,9 +127,9 @@ def _opti(ctx: Context, q: Operands) -> None:
     while q.values:
         i = q.first_word()
         if i != 0:
-            label = q.describe(0)
-            ctx.fail(7, "the name of an option is wanted before this {type}", type=type_of(q.values[0]),
-                     hint="options come in pairs: OPTI DIME 3 ;") if label else None
+            ctx.places["value"] = q.nodes[0]
+            ctx.fail(7, "the name of an option is wanted before this {type}", type=type_of(q.values[0]), at="value",
+                     hint="options come in pairs: OPTI DIME 3 ;")
         word, node = q.values[0], q.nodes[0]
         name = str(word)[:4] if isinstance(word, str) else ""
         if name not in OPTIONS:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gibiane.binding import Operands
+from gibiane.diagnostics import nearest
 from gibiane.forms import Arg
 from gibiane.registry import Context, Refused, operator
 from gibiane.values import ANY, ENTIER, MOT, TABLE, Table, type_of
@@ -84,7 +85,11 @@ def _forget_name(ctx: Context, q: Any) -> None:
     node = q.nodes[0] if q.nodes else None
     name = getattr(node, "name", None)
     if name is None or name not in ctx.session.evaluator.frame.names:
-        ctx.fail(9, "no object {name} to forget here", name=name or "")
+        if node is not None:
+            ctx.places["name"] = node
+        close = nearest(name or "", list(ctx.session.names()))
+        ctx.fail(9, "no object {name} to forget here", name=name or "", at="name", close=close,
+                 hint="did you mean {close}?" if close else None)
     q.take((ANY,))
     del ctx.session.evaluator.frame.names[name]
 

@@ -1,0 +1,32 @@
+"""Names of Cast3M 2024 that this program does not have: known by name, so that a script is told what it misses."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+
+@cache
+def names() -> dict[str, str]:
+    """Return the names of operators (four letters) and procedures, each with what is nearest here, or ""."""
+    text = files("gibiane").joinpath("cast3m_names.txt").read_text(encoding="utf-8")
+    found = {}
+    for line in text.splitlines():
+        if line and not line.startswith("#"):
+            name, _, near = line.partition(":")
+            found[name.strip()] = near.strip()
+    return found
+
+
+def lacks(word: str) -> tuple[str, str] | None:
+    """Return the Cast3M name that `word` means and what is nearest to it here, or None.
+
+    A procedure is meant by its whole name, an operator by its four letters or a longer spelling of them.
+    """
+    known = names()
+    if word in known:
+        return word, known[word]
+    key = word[:4]
+    if len(word) >= 4 and key in known and word[4:].isalpha():
+        return key, known[key]
+    return None
