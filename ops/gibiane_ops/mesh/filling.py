@@ -139,6 +139,17 @@ def _contour(ctx: Context, g: Maillage, at: str) -> IntArray:
             shapes=" ".join(g.shapes) or "no element",
             hint="CONT gives the contour of a surface",
         )
+    free = np.flatnonzero(np.bincount(segments.ravel()) % 2)
+    if len(free):
+        ctx.fail(
+            28,
+            "the contour is not closed: {count} free end(s), the first at ({place})",
+            at=at,
+            count=len(free),
+            place=", ".join(f"{x:.6g}" for x in nodes_of(ctx).coords[free[0]]),
+            label="open",
+            hint="ELIM joins ends at one place; DROIT L closes a line",
+        )
     return segments
 
 
