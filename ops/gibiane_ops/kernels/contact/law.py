@@ -99,6 +99,16 @@ class Friction:
         if not plain.is_coulomb:
             raise UnsupportedLaw(method, "Coulomb's law" + (" with cohesion" if cohesion else ""))
 
+    def need_no_adhesion(self, method: str) -> None:
+        """Raise UnsupportedLaw when the law has adhesion.
+
+        Raises
+        ------
+        UnsupportedLaw
+        """
+        if self.adhesion.any():
+            raise UnsupportedLaw(method, "laws without adhesion")
+
     def scaled(self, force: float, length: float) -> Friction:
         """Write the law in units of a force and a length."""
         return replace(

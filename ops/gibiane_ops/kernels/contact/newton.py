@@ -10,6 +10,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.balance import raise_if_runaway, raise_if_unbalanced
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction, friction
+from gibiane_ops.kernels.contact.outcome import physical_state
 from gibiane_ops.kernels.contact.problem import BoolArray, Problem
 from gibiane_ops.kernels.contact.report import STICK, ContactState, check_state
 from gibiane_ops.kernels.errors import NotConverged
@@ -205,35 +206,6 @@ def first_guess(problem: Problem, start: ContactState | None) -> tuple[FloatArra
     return start.w / problem.length, start.r / problem.force
 
 
-def physical_state(
-    interface: Interface,
-    law: Friction,
-    problem: Problem,
-    found: Iterate,
-    history: list[float],
-    slip_origin: FloatArray | None,
-) -> ContactState:
-    """Go back to physical units and measure the result against the exact laws."""
-    w = found.w * problem.length
-    if not law.rubs.any():
-        w = without_drift(w, interface)
-    return check_state(
-        interface, w, found.r * problem.force, found.status, law, history, slip_origin, bonded=problem.bonded
-    )
-
-
-def without_drift(w: FloatArray, interface: Interface) -> FloatArray:
-    """Remove the part of w that slides freely without friction: no force opposes it, so nothing fixes it."""
-    R = interface.rigid
-    if R.shape[1] == 0:
-        return w
-    # motions along the surface only: those that change a gap are settled by the normal forces
-    _, values, Vt = np.linalg.svd(R[:: w.shape[1]], full_matrices=True)
-    still = np.r_[values, np.zeros(len(Vt) - len(values))] <= 1e-9
-    D = R @ Vt[still].T
-    return np.asarray(w - (D @ (D.T @ w.ravel())).reshape(w.shape))
-
-
 def _solve(
     interface: Interface,
     law: Friction,
@@ -248,7 +220,7 @@ def _solve(
     first = first_guess(problem, start)
 
     def state(found: Iterate) -> ContactState:
-        return physical_state(interface, law, problem, found, history, slip_origin)
+        return physical_state(interface, law, problem, found.w, found.r, found.status, history, slip_origin)
 
     best, last = newton_steps(problem, first, tolerance, max_iter, history)
     if not best.converged:
@@ -256,16 +228,50 @@ def _solve(
         # slip may spread from pair to pair, one a step: go on as long as there is progress
         more, last = newton_steps(problem, (last.w, last.r), tolerance, 2 * interface.n_pairs, history)
         best = best.better(more)
+    if not best.converged:
+        best = best.better(_other_paths(problem, first, tolerance, max_iter, history))
     soft = replace(problem, gamma=min(problem.gamma, SOFT_GAMMA))
-    for attempt, damped in ((soft, False), (problem, True), (soft, True)):
-        if not best.converged:
-            best = best.better(newton_steps(attempt, first, tolerance, max_iter, history, damped=damped)[0])
     if not best.converged and law.rubs.any():
         best = best.better(_grow_friction(soft, first, tolerance, max_iter, history))
     if not best.converged:
         raise_if_runaway(interface, state(last), state(best))
         raise NotConverged(history, state(best))
     return state(best)
+
+
+def robust_steps(
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: list[float]
+) -> Iterate:
+    """Run full steps, then if needed softer and damped ones, and give the best iterate met.
+
+    Parameters
+    ----------
+    problem : Problem
+    first : tuple of (n, d) float64
+    tolerance : float
+    max_iter : int
+        Steps of each attempt.
+    history : list of float
+        Grows by one residual a step.
+
+    Returns
+    -------
+    Iterate
+    """
+    best = newton_steps(problem, first, tolerance, max_iter, history)[0]
+    return best if best.converged else best.better(_other_paths(problem, first, tolerance, max_iter, history))
+
+
+def _other_paths(
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: list[float]
+) -> Iterate:
+    # the gamma of a penalty is its stiffness and stays
+    soft = problem if problem.penalty else replace(problem, gamma=min(problem.gamma, SOFT_GAMMA))
+    best = Iterate.of(problem, *first, tolerance)
+    for attempt, damped in ((soft, False), (problem, True), (soft, True)):
+        if not best.converged:
+            best = best.better(newton_steps(attempt, first, tolerance, max_iter, history, damped=damped)[0])
+    return best
 
 
 def _grow_friction(

@@ -1,0 +1,111 @@
+"""De Saxce's bipotential: contact and friction as one projection on Coulomb's cone, in Uzawa iterations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
+from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection
+from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.law import Friction
+from gibiane_ops.kernels.contact.newton import first_guess
+from gibiane_ops.kernels.contact.outcome import PATIENCE, finished, physical_state
+from gibiane_ops.kernels.contact.penalty import check_stiffness
+from gibiane_ops.kernels.contact.problem import Problem
+from gibiane_ops.kernels.contact.report import ContactState
+
+
+def solve_bipotential(
+    interface: Interface,
+    mu: float | FloatArray | Friction,
+    rho: float,
+    *,
+    tolerance: float = 1e-8,
+    max_iter: int = 20000,
+    start: ContactState | None = None,
+    slip_origin: FloatArray | None = None,
+) -> ContactState:
+    """Solve contact with Coulomb friction by Uzawa iterations on the bipotential.
+
+    Parameters
+    ----------
+    interface : Interface
+    mu : float, (n,) float64 or Friction
+        Finite coefficients of Coulomb's law.
+    rho : float
+        Parameter of the iterations over ``interface.kref``.
+    tolerance : float
+        Largest residual over the largest condensed load.
+    max_iter : int
+    start : ContactState, optional
+    slip_origin : (n, d - 1) float64, optional
+
+    Returns
+    -------
+    ContactState
+
+    Raises
+    ------
+    ContactUnbalanced, NotConverged
+    UnsupportedLaw
+        For another law than Coulomb's.
+    BadValue
+        When rho is not positive.
+
+    Notes
+    -----
+    A state obeys the laws when ``r = proj(r - rho (w - gap n - mu abs(w_t) n))``, the projection on the cone being the
+    orthogonal one. Each iteration solves ``(S + rho) w = f + r + rho z``, z being the displacement that the law allowed
+    last, and projects once. The shift of S holds bodies that only contact holds, for which the displacements of
+    Uzawa's plain iteration do not exist. Convergence is linear, best for rho near 1 and slower in proportion on both
+    sides; it has a proof without friction only, and the term ``mu abs(w_t)`` makes large coefficients oscillate.
+
+    Source
+    ------
+    De Saxce and Feng 1998, Mathematical and Computer Modelling 28; Glowinski and Le Tallec 1989 (splitting).
+
+    Cost
+    ----
+    One dense factorisation in all, a back substitution and a vectorised projection an iteration; tens to thousands of
+    iterations.
+    """
+    from scipy.linalg import cho_factor, cho_solve
+
+    law = Friction.of(interface.n_pairs, mu)
+    law.need_coulomb("the bipotential method")
+    check_stiffness(rho)
+    problem = Problem.of(interface, law, 1.0, slip_origin)
+    coefficient = np.minimum(law.mu, 1e6)
+    factor = cho_factor(problem.S + rho * np.eye(len(problem.f)))
+    z, r = first_guess(problem, start)
+    r = _cone(problem, r, coefficient)
+    z = z - problem.origin
+    S0 = problem.S @ problem.origin.ravel()
+    history: list[float] = []
+    converged = False
+    w = z + problem.origin
+
+    def state() -> ContactState:
+        status = problem.project(problem.augmented(w, r))[1]
+        return physical_state(interface, law, problem, w, r, status, history, slip_origin)
+
+    for number in range(max_iter):
+        v = cho_solve(factor, problem.f - S0 + (r + rho * z).ravel()).reshape(r.shape)
+        shifted = v.copy()
+        shifted[:, 0] -= coefficient * norms(v[:, 1:])
+        new = _cone(problem, r - rho * shifted, coefficient)
+        z = v + (new - r) / rho
+        w, r = v + problem.origin, new
+        history.append(problem.merit(w, r))
+        if history[-1] <= tolerance:
+            converged = True
+            break
+        if number == PATIENCE:
+            raise_if_unbalanced(interface, state())
+    return finished(interface, state(), converged)
+
+
+def _cone(problem: Problem, r: FloatArray, mu: FloatArray) -> FloatArray:
+    """Project on the cone; a pair whose normal is held elsewhere carries nothing."""
+    return np.where(problem.holds[:, None], orthogonal_projection(r, mu), 0.0)

@@ -1,0 +1,75 @@
+"""What every method does at its end: measure its state, return it when it has converged, else say why it has not."""
+
+from __future__ import annotations
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
+from gibiane_ops.kernels.contact.drift import without_drift
+from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.law import Friction
+from gibiane_ops.kernels.contact.problem import Problem
+from gibiane_ops.kernels.contact.report import ContactState, check_state
+from gibiane_ops.kernels.errors import NotConverged
+
+PATIENCE = 500
+"""Iterations of a slow method after which the load is checked: what no contact force balances needs no more."""
+
+
+def physical_state(
+    interface: Interface,
+    law: Friction,
+    problem: Problem,
+    w: FloatArray,
+    r: FloatArray,
+    status: IntArray,
+    history: list[float],
+    slip_origin: FloatArray | None,
+) -> ContactState:
+    """Go back to physical units and measure a state against the exact laws.
+
+    Parameters
+    ----------
+    interface : Interface
+    law : Friction
+        In physical units.
+    problem : Problem
+        Whose units w and r have.
+    w, r : (n, d) float64
+    status : (n,) int64
+    history : list of float
+    slip_origin : (n, d - 1) float64 or None
+
+    Returns
+    -------
+    ContactState
+    """
+    w = w * problem.length
+    if not law.rubs.any():
+        w = without_drift(w, interface)
+    return check_state(interface, w, r * problem.force, status, law, history, slip_origin, bonded=problem.bonded)
+
+
+def finished(interface: Interface, state: ContactState, converged: bool) -> ContactState:
+    """Return a converged state; otherwise raise the error that explains the failure.
+
+    Parameters
+    ----------
+    interface : Interface
+    state : ContactState
+    converged : bool
+
+    Returns
+    -------
+    ContactState
+
+    Raises
+    ------
+    ContactUnbalanced
+        When no admissible contact force balances the load.
+    NotConverged
+        Otherwise; ``best`` holds the state.
+    """
+    if not converged:
+        raise_if_unbalanced(interface, state)
+        raise NotConverged(state.history, state)
+    return state

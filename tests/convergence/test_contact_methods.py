@@ -1,0 +1,148 @@
+"""Every contact method against the exact Newton solution on two blocks, and the numbers that characterise each."""
+
+import numpy as np
+import pytest
+from two_blocks import blocks, load_push
+
+from gibiane_ops.kernels.contact.augmented import solve_augmented_newton, solve_uzawa
+from gibiane_ops.kernels.contact.bipotential import solve_bipotential
+from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
+from gibiane_ops.kernels.contact.law import friction
+from gibiane_ops.kernels.contact.multipliers import solve_multipliers
+from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.penalty import solve_penalty
+from gibiane_ops.kernels.contact.projected_cg import solve_projected_cg
+from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
+from gibiane_ops.kernels.errors import BadValue, ContactUnbalanced, NotConverged, UnsupportedLaw
+
+METHODS = {
+    # method, and how far its forces and displacements may be from Newton's, over the largest
+    "tresca": (solve_tresca_sequence, 1e-7),
+    "multipliers": (solve_multipliers, 1e-9),
+    "augmented newton": (lambda i, mu: solve_augmented_newton(i, mu, 10.0), 1e-9),
+    "uzawa": (lambda i, mu: solve_uzawa(i, mu, 100.0), 1e-7),
+    "gauss-seidel": (solve_gauss_seidel, 1e-6),
+    "bipotential": (lambda i, mu: solve_bipotential(i, mu, 1.0), 2e-6),
+}
+
+
+def close_to(found, exact, share):
+    np.testing.assert_allclose(found.r, exact.r, atol=share * np.abs(exact.r).max())
+    np.testing.assert_allclose(found.w, exact.w, atol=share * np.abs(exact.w).max())
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("mu", [0.0, 0.05, 0.2, 0.4])
+@pytest.mark.parametrize("scene", ["T1_2", "T1_2h"])
+def test_same_solution_as_newton(scene, mu, method):
+    interface = blocks(scene).interface
+    solve, share = METHODS[method]
+    exact, found = solve_coulomb(interface, mu), solve(interface, mu)
+    close_to(found, exact, share)
+    assert found.report.worst < 1e-6
+    assert found.history
+    assert (found.report.n_open, found.report.n_slip) == (exact.report.n_open, exact.report.n_slip)
+
+
+@pytest.mark.parametrize("scene", ["T1_2", "T1_2h"])
+def test_projected_cg_without_friction(scene):
+    interface = blocks(scene).interface
+    found = solve_projected_cg(interface)
+    close_to(found, solve_coulomb(interface, 0.0), 1e-8)
+    assert found.iterations <= 40
+    with pytest.raises(UnsupportedLaw):
+        solve_projected_cg(interface, 0.2)
+
+
+# relative error of the slip, of the nodal forces, largest penetration in mm, for g / kref on T1, h = 12.5 mm, mu = 0.2
+PENALTY = {
+    1e-3: (4e3, 0.27, 0.43),
+    1e-1: (42, 0.22, 4e-3),
+    1.0: (4.6, 0.11, 5e-4),
+    10.0: (0.49, 1.8e-2, 5e-5),
+    1e2: (5e-2, 2e-3, 5e-6),
+    1e4: (5e-4, 2e-5, 5e-8),
+    1e6: (5e-6, 2e-7, 5e-10),
+    1e8: (5e-8, 2e-9, 5e-12),
+}
+
+
+def penalty_errors(g):
+    interface = blocks("T1_2").interface
+    exact, found = solve_coulomb(interface, 0.2), solve_penalty(interface, 0.2, g)
+    slip, force = np.abs(found.w - exact.w).max(), np.abs(found.r - exact.r).max()
+    return slip / np.abs(exact.w).max(), force / np.abs(exact.r).max(), (found.w[:, 0] - interface.gap).max(), found
+
+
+@pytest.mark.parametrize("g", PENALTY)
+def test_penalty_errors(g):
+    *errors, found = penalty_errors(g)
+    for error, expected in zip(errors, PENALTY[g], strict=True):
+        assert expected / 2 < error < 2 * expected
+    assert found.iterations <= 8
+    assert found.report.penetration > 0
+
+
+def test_penalty_error_is_inverse_to_the_penalty():
+    grid = 10.0 ** np.arange(2, 7)
+    for column in range(3):
+        slope = np.polyfit(np.log(grid), [np.log(penalty_errors(g)[column]) for g in grid], 1)[0]
+        assert slope == pytest.approx(-1, abs=0.02)
+
+
+@pytest.mark.parametrize("g", PENALTY)
+@pytest.mark.parametrize("scene", ["T1_2", "T1_2h"])
+def test_perturbed_lagrangian_is_the_penalty_method(scene, g):
+    interface = blocks(scene).interface
+    close_to(solve_multipliers(interface, 0.2, perturbation=g), solve_penalty(interface, 0.2, g), 1e-10)
+
+
+@pytest.mark.parametrize(("r", "passes"), [(0.1, 218), (1.0, 32), (10.0, 10), (100.0, 5), (1000.0, 4)])
+def test_uzawa_passes(r, passes):
+    interface = blocks("T1_2").interface
+    assert solve_uzawa(interface, 0.2, r).iterations == pytest.approx(passes, abs=1)
+
+
+def test_uzawa_with_a_small_penalty_says_that_it_did_not_converge():
+    with pytest.raises(NotConverged) as caught:
+        solve_uzawa(blocks("T1_2").interface, 0.2, 0.01)
+    assert len(caught.value.history) == 400
+    assert caught.value.best.report.worst > 1e-5
+
+
+def test_tresca_contracts_more_slowly_with_more_friction():
+    interface, _ = load_push("T1_1", 0.45, on_top=False)
+    counts = [solve_tresca_sequence(interface, mu).iterations for mu in (0.5, 0.8, 1.2)]
+    for mu in (0.5, 0.8, 1.2):
+        close_to(solve_tresca_sequence(interface, mu), solve_coulomb(interface, mu), 1e-6)
+    assert max(counts) > 7
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_load_that_friction_cannot_balance_is_never_a_result(method):
+    interface, _ = load_push("T1_1", 0.21, on_top=True)
+    with pytest.raises(ContactUnbalanced):
+        METHODS[method][0](interface, 0.2)
+
+
+def test_penalty_beyond_the_limit_of_friction():
+    interface, _ = load_push("T1_1", 0.21, on_top=True)
+    with pytest.raises(ContactUnbalanced):
+        solve_penalty(interface, 0.2, 1e4)
+
+
+@pytest.mark.parametrize("r", [0.0, -1.0, np.nan, np.inf])
+def test_bad_penalty(r):
+    interface = blocks("T1_1").interface
+    for solve in (solve_penalty, solve_uzawa, solve_augmented_newton, solve_bipotential):
+        with pytest.raises(BadValue):
+            solve(interface, 0.2, r)
+
+
+def test_laws_that_a_method_cannot_treat():
+    interface = blocks("T1_1").interface
+    with pytest.raises(UnsupportedLaw):
+        solve_bipotential(interface, friction(9, mu=0.2, cohesion=1.0), 1.0)
+    for solve in (solve_tresca_sequence, solve_gauss_seidel, solve_multipliers):
+        with pytest.raises(UnsupportedLaw):
+            solve(interface, friction(9, mu=0.2, adhesion=1.0))
