@@ -82,7 +82,7 @@ def _same_place(points: FloatArray) -> IntArray | None:
     Key("ERREUR", "sizes for a prescribed error", required=True),
     Arg("carte", MCHAML, "map of relative errors"),
     Arg("model", MMODEL, "model"),
-    Key("PREC", "prescribed relative error", Arg("e0", FLOTTANT), required=True),
+    Key("PREC", "prescribed relative error (needed)", Arg("e0", FLOTTANT)),
     Key("ORDRE", "order of convergence", Arg("p", FLOTTANT)),
     Key("SING", "lower order where the error peaks"),
     Key("MINI", "smallest size", Arg("h1", FLOTTANT)),
@@ -97,7 +97,7 @@ def _wanted(
     erreur: bool,
     carte: MChaml,
     model: Modele,
-    prec: float,
+    prec: float | None,
     ordre: float | None,
     sing: bool,
     mini: float | None,
@@ -106,6 +106,8 @@ def _wanted(
     nbma: float | None,
     minn: bool,
 ) -> Any:
+    if prec is None:
+        ctx.fail(7, "the prescribed error is missing", hint="'PREC' 0.05 for 5 percent")
     if not prec > 0:
         ctx.fail(
             41,

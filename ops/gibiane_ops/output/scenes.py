@@ -224,7 +224,7 @@ def arrow_layers(points: FloatArray, vectors: Vecteur, size: float) -> list[Laye
         start = points[nodes[kept]]
         if arrow.factor is not None and arrow.factor < 0:
             start = start + arrow.factor * values[kept]
-        label = " ".join(arrow.names)
+        label = " ".join(n for n in arrow.names if n in arrow.field.names)
         layers.append(Arrows(start, values[kept], longest, COLOURS.get(arrow.colour) or "#111111", label))
     return layers
 

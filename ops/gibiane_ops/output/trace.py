@@ -99,6 +99,8 @@ class _Request:
 def _trac(ctx: Context, q: Operands) -> None:
     request = _read(ctx, q)
     ctx.places.setdefault("object", ctx.node)
+    if request.words & set(NUMBERS):
+        ctx.warn(251, "numbers and values are not written on pictures yet", level=0)
     if not (request.meshes or request.shapes or request.element):
         if request.nodal or request.arrows:
             raise q.missing(MAILLAGE, "the mesh under the field")
