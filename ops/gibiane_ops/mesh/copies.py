@@ -21,7 +21,10 @@ VECTORS = (("UX", "UY", "UZ"), ("FX", "FY", "FZ"), ("RX", "RY", "RZ"), ("MX", "M
 
 def with_sides(mesh: Maillage) -> IntArray:
     """Return the nodes of a mesh and of its recorded sides, sorted."""
-    return np.unique(np.concatenate([mesh.nodes, *(side.nodes for side in mesh.sides.values())]))
+    marked = np.zeros(mesh.store.count, bool)
+    for part in (mesh, *mesh.sides.values()):
+        marked[part.nodes] = True
+    return np.flatnonzero(marked).astype(np.int64)
 
 
 class Copier:
@@ -54,7 +57,9 @@ class Copier:
         self.pairs: dict[int, ContactZone] = {}
         self.nodes = np.unique(np.concatenate([self._nodes(x) for x in objects]))
         moved = move(self.store.coords[self.nodes], self.nodes)
-        self.copies = self.store.add(moved, self.store.density[self.nodes])
+        copies = self.store.add(moved, self.store.density[self.nodes])
+        self.place = np.empty(self.store.count, np.int64)
+        self.place[self.nodes] = copies
 
     def results(self) -> tuple[Any, ...]:
         """Return the copies, in the order of the objects."""
@@ -75,7 +80,7 @@ class Copier:
         self.ctx.fail(39, "a {type} cannot be moved", type=getattr(x, "type_name", type(x).__name__))
 
     def _map(self, ids: IntArray) -> IntArray:
-        return self.copies[np.searchsorted(self.nodes, ids)]
+        return self.place[ids]
 
     def _copy(self, x: Any) -> Any:
         if isinstance(x, Point):

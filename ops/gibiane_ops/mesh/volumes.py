@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
@@ -30,6 +31,8 @@ from gibiane_ops.mesh.building import (
 )
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
+
+BoolArray = NDArray[np.bool_]
 
 VOLU = operator(
     "VOLUME",
@@ -112,21 +115,21 @@ def _sweep(
     if end is not None:
         layers.append(end[None])
     ids = np.concatenate(layers)
-    blocks, bottom, top = [], [], []
+    blocks, bottom, top, against = [], [], [], []
     for block in surface.blocks:
         local = np.searchsorted(base, block.cells)
         name, cells = sweep.sweep_cells(block.shape, local, ids)
-        with explained(ctx, "s"):
-            volume = geometry.measures(shape(name), store.coords[cells])
-        cells = np.where((volume < 0)[:, None], orientation.reversed_cells(name, cells), cells)
-        # Seen from its own side, the base turns against the sweep where the element had to be turned over.
-        turned, first = volume < 0, len(block.cells)
+        turned = geometry.measures(shape(name), store.coords[cells]) < 0
+        cells[turned] = orientation.reversed_cells(name, cells[turned])
+        # The base faces against the sweep where the element had to be turned over.
+        first = len(block.cells)
+        against.append(turned[:first])
         bottom.append((block.shape, _outward(block.shape, block.cells, ~turned[:first])))
         top.append((block.shape, _outward(block.shape, ids[-1][local], turned[-first:])))
         with explained(ctx, "s"):
             geometry.check_cells(shape(name), store.coords[cells])
         blocks.append((name, cells))
-    around = _around(blocks, ids)
+    around = _around(surface, np.concatenate(against), base, ids)
     faces = {"1": new_mesh(ctx, bottom), "2": new_mesh(ctx, top), "3": new_mesh(ctx, around)}
     volume_mesh = new_mesh(ctx, blocks, faces)
     parts = [part for part in (extended, volume_mesh, after) if part is not None]
@@ -136,19 +139,18 @@ def _sweep(
     return join(parts, {"1": parts[0].sides["1"], "2": parts[-1].sides["2"], "3": lateral})
 
 
-def _outward(name: str, cells: IntArray, turn: Any) -> IntArray:
+def _outward(name: str, cells: IntArray, turn: BoolArray) -> IntArray:
     return np.where(turn[:, None], orientation.reversed_cells(name, cells), cells)
 
 
-def _around(blocks: list[tuple[str, IntArray]], ids: IntArray) -> list[tuple[str, IntArray]]:
-    """Return the boundary facets that stand between two layers."""
-    found = topology.boundary(blocks).get("QUA4")
-    if found is None:
+def _around(surface: Maillage, against: BoolArray, base: IntArray, ids: IntArray) -> list[tuple[str, IntArray]]:
+    """Return the facets swept by the border of the base; `against` tells which of its elements face the other way."""
+    border = topology.boundary(surface.kernel_blocks).get("SEG2")
+    if border is None:
         return []
-    layer = np.zeros(int(ids.max()) + 1, np.int64)
-    layer[ids.ravel()] = np.repeat(np.arange(len(ids)), ids.shape[1])
-    at = layer[found.nodes]
-    return [("QUA4", found.nodes[at.min(axis=1) != at.max(axis=1)])]
+    # On an element that faces the sweep the border keeps it on its left, so that the swept facet looks outside.
+    ends = np.where(against[border.cell][:, None], border.nodes[:, ::-1], border.nodes)
+    return [sweep.sweep_cells("SEG2", np.searchsorted(base, ends), ids)]
 
 
 @VOLU.form(

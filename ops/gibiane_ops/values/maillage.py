@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+
 from gibiane.fortran import general
 from gibiane.values import MAILLAGE, POINT, Value
-
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore
 
 COLOURS = ("DEFA", "BLEU", "ROUG", "ROSE", "VERT", "TURQ", "JAUN", "BLAN", "NOIR", "VIOL", "ORAN", "AZUR", "OCEA",
@@ -107,9 +107,11 @@ class Maillage(Value):
     @property
     def nodes(self) -> IntArray:
         """Distinct nodes, sorted."""
-        if not self.blocks:
-            return np.zeros(0, np.int64)
-        return np.unique(np.concatenate([b.cells.ravel() for b in self.blocks]))
+        # Marking is many times faster than sorting the nodes of all elements.
+        marked = np.zeros(self.store.count, bool)
+        for block in self.blocks:
+            marked[block.cells] = True
+        return np.flatnonzero(marked).astype(np.int64)
 
     def nodes_in_order(self) -> IntArray:
         """Return the distinct nodes in order of first appearance (the order along a line)."""

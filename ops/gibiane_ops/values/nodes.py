@@ -63,19 +63,16 @@ class NodeStore:
         return self._alias[np.asarray(ids, np.int64)]
 
     def merge(self, kept: IntArray, dropped: IntArray) -> None:
-        """Let each node `kept[i]` stand for `dropped[i]` from now on."""
+        """Make each node `kept[i]` and `dropped[i]` one: the one of smaller id stands for both from now on."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
         kept, dropped = self.canonical(kept), self.canonical(dropped)
-        target = np.arange(self.count)
-        for a, b in zip(kept, dropped, strict=True):
-            root_a, root_b = int(a), int(b)
-            while target[root_a] != root_a:
-                root_a = int(target[root_a])
-            while target[root_b] != root_b:
-                root_b = int(target[root_b])
-            target[max(root_a, root_b)] = min(root_a, root_b)
-        while not np.array_equal(target[target], target):
-            target = target[target]
-        self._alias[: self.count] = target[self._alias[: self.count]]
+        links = coo_array((np.ones(len(kept), bool), (kept, dropped)), shape=(self.count, self.count))
+        _, group = connected_components(links, directed=False)
+        # Of each group of linked nodes the first stands for all.
+        _, first = np.unique(group, return_index=True)
+        self._alias[: self.count] = first[group][self._alias[: self.count]]
         self.version += 1
 
 
