@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from gibiane import cast3m
 from gibiane.diagnostics import Diagnostic, GibianeError, Label, Text, make, nearest
 from gibiane.forms import Arg, Form, Key
 from gibiane.nodes import Literal, Name, Node
@@ -125,6 +126,8 @@ class Operands:
         """Add to an error the unread word that nothing has and that hides what follows, with a likely correction."""
         i = self.first_word()
         node = self.nodes[i] if i >= 0 else None
+        if i >= 0 and self.values[i] in cast3m.names() and not self.is_operator_word(i):
+            raise GibianeError(self.not_available(i, self.values[i], cast3m.names()[self.values[i]]))
         if not isinstance(node, Name) or self.values[i] != node.word or self.is_operator_word(i):
             return
         if i > 0:
@@ -132,6 +135,14 @@ class Operands:
         close = nearest(node.word, [*self.session.names(), *self.session.library.names()])
         if close is not None:
             failure.hint = Text("did you mean {close}?", {"close": close})
+
+    def not_available(self, i: int, name: str, near: str) -> Diagnostic:
+        """Return the error 251 for an operator or procedure of Cast3M that is not here, called by word `i`."""
+        hint = "the nearest thing here: {near}" if near else "gibiane check --portability lists what a script misses"
+        failure = make(251, "{name} of Cast3M is not available yet", name=name, near=near, hint=hint,
+                       span=self.span(self.nodes[i]))
+        failure.operator = ""  # nobody else speaks for it
+        return failure
 
     def describe(self, i: int, wanted: str | None = None) -> Label:
         """Return a label that says what operand `i` is, and what was wanted instead."""

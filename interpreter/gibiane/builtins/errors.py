@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from gibiane.diagnostics import GibianeError, level_of, make
+from gibiane.diagnostics import GibianeError, Text, level_of, make
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ANY, ENTIER, MOT
@@ -20,12 +20,13 @@ ERRE = operator("ERREUR", topic="errors", summary="raise an error, or estimate t
 def _raise(ctx: Context, n: int, avec: list[Any] | None) -> None:
     if n == 0:
         return
-    sentence = "a test of this script failed" if n == 5 else "raised by the script"
-    if avec:
-        sentence += " ({values})"
+    sentence = Text("a test of this script failed" if n == 5 else "raised by the script")
     values = ", ".join(ctx.session.brief(v) for v in avec or [])
-    raise GibianeError(make(n, sentence, operator="ERREUR", span=ctx.operands.span(ctx.node), values=values,
-                            level=level_of(str(n))))
+    diagnostic = make(n, "{sentence} ({values})", operator="ERREUR", span=ctx.operands.span(ctx.node),
+                      sentence=sentence, values=values, level=level_of(str(n)))
+    if not avec:
+        diagnostic.sentence = sentence
+    raise GibianeError(diagnostic)
 
 
 @ERRE.form(Arg("text", MOT, "text to show"), last=True)

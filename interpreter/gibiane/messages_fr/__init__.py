@@ -1,0 +1,11 @@
+"""The sentences of messages in French, by their English template; the fields in braces are the same.
+
+A sentence that no module holds any more is removed, a new one added: tests/unit/gibiane/test_messages.py names both.
+"""
+
+from gibiane.messages_fr.language import LANGUAGE
+from gibiane.messages_fr.lists import LISTS
+from gibiane.messages_fr.mechanics import MECHANICS
+from gibiane.messages_fr.mesh import MESH
+
+FRENCH: dict[str, str] = {**LANGUAGE, **LISTS, **MESH, **MECHANICS}
