@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg
 from gibiane.registry import Context, extend, operator
 from gibiane.values import MCHAML, MMODEL, RIGIDITE
-
 from gibiane_ops.kernels import assembly
 from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs
-from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.values import mechanics
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
-from gibiane_ops.values.material import elastic_law
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, ContactZone, Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.rigidite import ContactPart, MatrixPart, Rigidite
@@ -53,12 +52,7 @@ def _solid(ctx: Context, model: Modele, material: MChaml) -> Rigidite:
     family, dim = zones[0].family, zones[0].dim
     mesh = Maillage(store, [b for zone in zones for b in zone.mesh.blocks])
     nodes = mesh.nodes
-    blocks = []
-    for zone in zones:
-        D = elastic_law(ctx, material, zone, "material")
-        X = store.coords[zone.cells][..., :dim]
-        with worded(ctx, at="model"):
-            blocks.append((np.searchsorted(nodes, zone.cells), assembly.element_stiffness(shape(zone.shape), X, D)))
+    blocks = [(np.searchsorted(nodes, zone.cells), mechanics.stiffness(ctx, zone, material)) for zone in zones]
     matrix = assembly.assemble(len(nodes), dim, blocks)
     return Rigidite([MatrixPart(nodes, DISPLACEMENTS[family], FORCES[family], matrix, mesh)])
 

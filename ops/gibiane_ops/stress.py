@@ -13,9 +13,9 @@ from gibiane_ops.kernels import assembly, invariants
 from gibiane_ops.kernels.arrays import strain_tensor, stress_tensor
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
+from gibiane_ops.values import mechanics
 from gibiane_ops.values.algebra import SCAL, SCALAIRE
 from gibiane_ops.values.champs import DISCRET, ChamZone, ChPoint, MChaml
-from gibiane_ops.values.failures import worded
 from gibiane_ops.values.material import (
     MATERIAL,
     STRAIN,
@@ -26,7 +26,7 @@ from gibiane_ops.values.material import (
     solid_zones,
     told_apart,
 )
-from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, STRAINS, STRESSES, Modele, ModelZone
+from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, node_store
 
 PRINCIPAL = "PRINCIPALE"
@@ -40,23 +40,6 @@ U = NOMC 'UZ' (1.E-3 * (COOR 3 V)) ;
 LINEAR = Key(("LINE", "QUAD"), "linear strains (the default)", name="how")
 
 
-def _strains(ctx: Context, zone: ModelZone, u: ChPoint) -> FloatArray:
-    of = shape(zone.shape)
-    names = DISPLACEMENTS[zone.family]
-    if not set(names) & set(u.names):
-        ctx.fail(
-            181,
-            "the field has no displacement ({wanted}); it has {known}",
-            at="u",
-            wanted=" ".join(names),
-            known=" ".join(u.names) or "no component",
-        )
-    corners = node_store(ctx).coords[zone.cells][..., : zone.dim]
-    nodal = u.table(names, zone.cells.ravel()).reshape(*zone.cells.shape, len(names))
-    with worded(ctx, at="model"):
-        return assembly.strains(of, corners, nodal, of.gauss[0])
-
-
 def _check_linear(ctx: Context, how: str | None) -> None:
     if how == "QUAD":
         ctx.fail(251, "quadratic strains are not available yet", at="how", hint="'LINE' is the default")
@@ -67,8 +50,8 @@ EPSI = operator(
     topic="fields",
     summary="strains of a displacement field",
     notice="An element field of sub-type DEFORMATIONS at the stress points: EPXX EPYY EPZZ GAXY GAXZ GAYZ in "
-    "space, EPXX EPYY EPZZ GAXY in the plane (engineering shears). In plane stress EPZZ is 0: ELAS of "
-    "the stresses gives it.",
+    "space, EPXX EPYY EPZZ GAXY in the plane, EPRR EPZZ EPTT GARZ in mode AXIS (engineering shears), EPSS in "
+    "bars. In plane stress EPZZ is 0: ELAS of the stresses gives it.",
     example=BLOCK + "MESS (MAXI (EXCO 'EPZZ' (EPSI MO U))) ;",
     see=["SIGMA", "ELAS"],
 )
@@ -79,7 +62,7 @@ EPSI = operator(
 )
 def _epsi(ctx: Context, model: Modele, u: ChPoint, how: str | None, noer: bool) -> MChaml:
     _check_linear(ctx, how)
-    zones = [ChamZone(z, STRAINS[z.family], _strains(ctx, z, u)) for z in solid_zones(ctx, model)]
+    zones = [ChamZone(z, z.strains, mechanics.strains(ctx, z, u)) for z in solid_zones(ctx, model)]
     return MChaml(zones, STRAIN, "STRESSES")
 
 
@@ -88,7 +71,8 @@ SIGM = operator(
     topic="fields",
     summary="stresses of a displacement field",
     notice="An element field of sub-type CONTRAINTES at the stress points: SMXX SMYY SMZZ SMXY SMXZ SMYZ in "
-    "space, SMXX SMYY SMZZ SMXY in the plane, by the elastic law of the material.",
+    "space, SMXX SMYY SMZZ SMXY in the plane, SMRR SMZZ SMTT SMRZ in mode AXIS, by the elastic law of the "
+    "material; the axial force EFFX in bars.",
     example=BLOCK + "MESS (MAXI (EXCO 'SMZZ' (SIGM MO MA U))) ;",
     see=["EPSI", "VMIS", "ERREUR"],
 )
@@ -107,7 +91,7 @@ def _sigm(ctx: Context, model: Modele, material: MChaml, u: ChPoint, how: str | 
     zones = []
     for zone in solid_zones(ctx, model):
         law = elastic_law(ctx, material, zone, "material")
-        zones.append(ChamZone(zone, STRESSES[zone.family], assembly.stresses(_strains(ctx, zone, u), law)))
+        zones.append(ChamZone(zone, zone.stresses, assembly.stresses(mechanics.strains(ctx, zone, u), law)))
     return MChaml(zones, STRESS, "STRESSES")
 
 
@@ -131,13 +115,12 @@ def _elas(ctx: Context, model: Modele, field: MChaml, material: MChaml) -> MCham
     given = (("field", field), ("material", material))
     source = STRAIN if STRAIN in (field.subtype, material.subtype) else STRESS
     field, material = told_apart(ctx, given, source, MATERIAL)
-    law, names, target = (elastic_law, STRESSES, STRESS) if source == STRAIN else (elastic_compliance, STRAINS, STRAIN)
+    law, target = (elastic_law, STRESS) if source == STRAIN else (elastic_compliance, STRAIN)
     zones = []
     for zone in solid_zones(ctx, model):
         values = on_zone(ctx, field, zone, "field").values
-        zones.append(
-            ChamZone(zone, names[zone.family], assembly.stresses(values, law(ctx, material, zone, "material")))
-        )
+        names = zone.stresses if target == STRESS else zone.strains
+        zones.append(ChamZone(zone, names, assembly.stresses(values, law(ctx, material, zone, "material"))))
     return MChaml(zones, target, field.support)
 
 
@@ -164,8 +147,7 @@ def _bsig(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> C
     for zone in zones:
         of = shape(zone.shape)
         values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
-        with worded(ctx, at="model"):
-            parts.append((zone.cells, assembly.internal_forces(of, store.coords[zone.cells][..., :dim], values)))
+        parts.append((zone.cells, mechanics.internal_forces(ctx, zone, values)))
     nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in parts]))
     local = [(np.searchsorted(nodes, cells), forces) for cells, forces in parts]
     total = assembly.assemble_vector(len(nodes), dim, local).reshape(-1, dim)
@@ -196,6 +178,14 @@ def _ener(ctx: Context, model: Modele, stress: MChaml, strain: MChaml) -> MChaml
     return MChaml(zones, SCALAIRE, "STRESSES", "energy")
 
 
+def _tensor_zones(ctx: Context, model: Modele) -> list[ModelZone]:
+    """Return the zones of a model, or fail when they are bars: a force has no principal directions."""
+    zones = solid_zones(ctx, model)
+    if any(zone.bars for zone in zones):
+        ctx.fail(19, "bars have an axial force, not a stress tensor", at="model", hint="EXCO 'EFFX' gives that force")
+    return zones
+
+
 def _scalar(
     ctx: Context,
     model: Modele,
@@ -207,7 +197,7 @@ def _scalar(
     (stress,) = told_apart(ctx, fields, STRESS)
     zones = [
         ChamZone(z, [SCAL], measure(on_zone(ctx, stress, z, "stress").values)[..., None])
-        for z in solid_zones(ctx, model)
+        for z in _tensor_zones(ctx, model)
     ]
     return MChaml(zones, SCALAIRE, stress.support, title)
 
@@ -283,7 +273,7 @@ PRIN = operator(
 def _prin(ctx: Context, model: Modele, field: MChaml, more: MChaml | None, trid: bool) -> MChaml:
     source = _tensor_field(ctx, field, more)
     zones = []
-    for zone in solid_zones(ctx, model):
+    for zone in _tensor_zones(ctx, model):
         tensor = _tensor(ctx, source, zone)
         values, axes = invariants.principal(tensor, in_plane=zone.dim == 2 and not trid)
         stacked = np.concatenate([values, axes.reshape(*values.shape[:2], 9)], axis=2)
@@ -310,7 +300,7 @@ INVA = operator(
 def _inva(ctx: Context, model: Modele, field: MChaml, more: MChaml | None) -> tuple[MChaml, MChaml, MChaml]:
     source = _tensor_field(ctx, field, more)
     zones: list[list[ChamZone]] = [[], [], []]
-    for zone in solid_zones(ctx, model):
+    for zone in _tensor_zones(ctx, model):
         for column, values in zip(zones, invariants.invariants(_tensor(ctx, source, zone)), strict=True):
             column.append(ChamZone(zone, [SCAL], values[..., None]))
     first, second, third = (MChaml(each, SCALAIRE, source.support) for each in zones)

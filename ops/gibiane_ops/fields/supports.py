@@ -129,7 +129,7 @@ REDU = operator(
     notice="`REDU CH G`: a nodal field on the nodes of a mesh, of a point or of another field; an element field on the "
     "elements of a mesh or of a model; a model on the elements of a mesh. The elements of the mesh must be among "
     "those of the field or model.",
-    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (0. 0.) (1. 0.) ; CH = COOR 1 L ;\nMESS (MAXI (REDU CH (L POIN 1))) ;",
+    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (0. 0.) (1. 0.) ; CH = COOR 1 L ;\nMESS (MAXI (REDU CH (L POIN 'INIT'))) ;",
     see=["EXCO", "ELEM"],
 )
 
@@ -201,7 +201,7 @@ INTG = operator(
     topic="fields",
     summary="integral of an element field",
     notice="`INTG MODL CH (c)`: the integral of the component c (of the only one) over the model; with 'ELEM' over "
-    "each element, an element field.",
+    "each element, an element field. In mode AXIS over the whole body of revolution (factor 2 pi r).",
     example="""
     OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0. 0.) (2. 0.)) TRAN 2 (0. 1.) ;
     MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MESS (INTG MO (MANU 'CHML' MO 'SCAL' 3.)) ;
@@ -243,7 +243,8 @@ def _intg(ctx: Context, model: Modele, field: MChaml, elem: bool, name: str | No
                 known=" ".join(values.names),
             )
         corners = coords[zone.cells][..., : zone.dim]
-        total = integrals(shape(zone.shape), corners, values.component(name)[..., None], field.support)
+        column = values.component(name)[..., None]
+        total = integrals(shape(zone.shape), corners, column, field.support, axisymmetric=zone.axisymmetric)
         zones.append(ChamZone(zone, [SCAL], total[:, None, :]))
     if elem:
         return MChaml(zones, SCALAIRE, "GRAVITE")

@@ -72,7 +72,9 @@ def moved(shape: Shape, values: FloatArray, source: str, target: str) -> FloatAr
     return np.asarray(np.matmul(shape.N(there) @ np.linalg.pinv(shape.N(here)), values), np.float64)
 
 
-def integrals(shape: Shape, X: FloatArray, values: FloatArray, support: str) -> FloatArray:
+def integrals(
+    shape: Shape, X: FloatArray, values: FloatArray, support: str, *, axisymmetric: bool = False
+) -> FloatArray:
     """Integrate values over each element.
 
     Parameters
@@ -83,6 +85,8 @@ def integrals(shape: Shape, X: FloatArray, values: FloatArray, support: str) -> 
         At the points of `support`.
     support : str
         See `support_points`.
+    axisymmetric : bool
+        Whether to integrate over the bodies of revolution of which the elements are the sections.
 
     Returns
     -------
@@ -97,4 +101,6 @@ def integrals(shape: Shape, X: FloatArray, values: FloatArray, support: str) -> 
     if not at_points:
         values = moved(shape, values, support, "MASSE")
     weight = geometry.measure_densities(shape, X, rule[0]) * rule[1]
+    if axisymmetric:
+        weight = weight * geometry.circumferences(shape, X, rule[0])
     return np.asarray((weight[..., None] * values).sum(axis=1), np.float64)

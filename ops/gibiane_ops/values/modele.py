@@ -6,16 +6,23 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from gibiane.values import MMODEL, Value
-
 from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.nodes import IntArray
 
 DISPLACEMENTS = {"TRID": ("UX", "UY", "UZ"), "PLAN": ("UX", "UY"), "AXIS": ("UR", "UZ")}
 FORCES = {"TRID": ("FX", "FY", "FZ"), "PLAN": ("FX", "FY"), "AXIS": ("FR", "FZ")}
-STRAINS = {"TRID": ("EPXX", "EPYY", "EPZZ", "GAXY", "GAXZ", "GAYZ"), "PLAN": ("EPXX", "EPYY", "EPZZ", "GAXY"),
-           "AXIS": ("EPRR", "EPZZ", "EPTT", "GARZ")}
-STRESSES = {"TRID": ("SMXX", "SMYY", "SMZZ", "SMXY", "SMXZ", "SMYZ"), "PLAN": ("SMXX", "SMYY", "SMZZ", "SMXY"),
-            "AXIS": ("SMRR", "SMZZ", "SMTT", "SMRZ")}
+STRAINS = {
+    "TRID": ("EPXX", "EPYY", "EPZZ", "GAXY", "GAXZ", "GAYZ"),
+    "PLAN": ("EPXX", "EPYY", "EPZZ", "GAXY"),
+    "AXIS": ("EPRR", "EPZZ", "EPTT", "GARZ"),
+    "BARR": ("EPSS",),
+}
+STRESSES = {
+    "TRID": ("SMXX", "SMYY", "SMZZ", "SMXY", "SMXZ", "SMYZ"),
+    "PLAN": ("SMXX", "SMYY", "SMZZ", "SMXY"),
+    "AXIS": ("SMRR", "SMZZ", "SMTT", "SMRZ"),
+    "BARR": ("EFFX",),
+}
 
 
 class ModelZone:
@@ -28,7 +35,7 @@ class ModelZone:
     formulation : str
         MECANIQUE (others later).
     law : tuple of str
-        E.g. ("ELASTIQUE", "ISOTROPE").
+        E.g. ("ELASTIQUE", "ISOTROPE"), ("ELASTIQUE", "ORTHOTROPE"), ("ELASTIQUE", "ISOTROPE", "BARR").
     mode : str
         TRID, "PLAN DEFO", "PLAN CONT" or AXIS.
     """
@@ -58,6 +65,31 @@ class ModelZone:
     def dim(self) -> int:
         """Number of coordinates that the kernels use."""
         return 3 if self.family == "TRID" else 2
+
+    @property
+    def axisymmetric(self) -> bool:
+        """Whether the mesh is the meridian section of a body of revolution."""
+        return self.family == "AXIS"
+
+    @property
+    def bars(self) -> bool:
+        """Whether the elements are lines that resist stretching only."""
+        return "BARR" in self.law
+
+    @property
+    def orthotropic(self) -> bool:
+        """Whether the elastic law has directions."""
+        return "ORTHOTROPE" in self.law
+
+    @property
+    def strains(self) -> tuple[str, ...]:
+        """Names of the strains."""
+        return STRAINS["BARR" if self.bars else self.family]
+
+    @property
+    def stresses(self) -> tuple[str, ...]:
+        """Names of the stresses, or of the forces in bars."""
+        return STRESSES["BARR" if self.bars else self.family]
 
 
 class ContactZone:
@@ -93,7 +125,9 @@ class Modele(Value):
         """Yield the lines that LIST prints."""
         yield f" MMODEL de pointeur {session.ordinal(self)}"
         for number, zone in enumerate(self.zones, 1):
-            yield (f" zone {number} : {zone.mesh.n_cells} element(s) {zone.shape}, {zone.formulation} "
-                   f"{' '.join(zone.law)}, mode {zone.mode}")
+            yield (
+                f" zone {number} : {zone.mesh.n_cells} element(s) {zone.shape}, {zone.formulation} "
+                f"{' '.join(zone.law)}, mode {zone.mode}"
+            )
         for number, pair in enumerate(self.contacts, 1):
             yield f" contact {number} : {pair.slave.n_cells} facette(s) sur {pair.master.n_cells}, {pair.law}"
