@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gibiane.diagnostics import Diagnostic, make
 from gibiane.nodes import Instr, Literal, Name
 
@@ -102,7 +104,7 @@ def check_structure(program: list[Instr], start: int, end: int) -> list[Diagnost
     open_blocks: list[tuple[str, int, bool]] = []  # word, index, SINON seen
     names: dict[int, list[str]] = {}
 
-    def report(code: int, text: str, at: int, hint: str, **fields: object) -> None:
+    def report(code: int, text: str, at: int, hint: str, **fields: Any) -> None:
         found.append(make(code, text, span=program[at].span(), hint=hint, **fields))
 
     for index in range(start, end):

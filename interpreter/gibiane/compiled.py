@@ -86,9 +86,9 @@ def instruction(instr: Instr) -> Callable[[Frame], bool] | None:
 
 def _call(instr: Instr, target: str) -> Callable[[Frame], bool] | None:
     """Return a closure for `NAME = PROCEDURE number number ...`, or None."""
-    first, *rest = instr.items or [None]
-    if not isinstance(first, Name):
+    if not instr.items or not isinstance(first := instr.items[0], Name):
         return None
+    rest = instr.items[1:]
     fetches = [_operand([item]) for item in rest]
     if any(f is None for f in fetches):
         return None

@@ -84,6 +84,6 @@ class Form:
     def usage(self, name: str) -> str:
         """Return the usage line of this form."""
         left = " ".join(self.gives)
-        body = self.syntax if self.syntax is not None else " ".join(p.usage() for p in [*self.args, *self.keys])
+        body = self.syntax if self.syntax is not None else " ".join([*(a.usage() for a in self.args), *(k.usage() for k in self.keys)])
         text = f"{name} {body}".rstrip()
         return f"{left} = {text} ;" if left else f"{text} ;"

@@ -57,7 +57,7 @@ class Library:
 
     def names(self) -> list[str]:
         """Return the names of all procedures that can be found, for completion and hints."""
-        found = set()
+        found: set[str] = set()
         for folder in {os.path.realpath(f) for f in self.folders()}:
             if Path(folder).is_dir():
                 found.update(p.stem.upper() for p in Path(folder).glob("*.procedur"))

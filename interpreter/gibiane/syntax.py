@@ -114,7 +114,7 @@ def _instruction(source: SourceText, held: list[Token], end: int, errors: dict[i
 
 def _grouped(source: SourceText, held: list[Token]) -> tuple[list[Node] | None, list[Node]]:
     try:
-        result: tuple[list[Node] | None, list[Node]] = _parser().parse(held)  # type: ignore[arg-type, assignment]
+        result: tuple[list[Node] | None, list[Node]] = _parser().parse(held)  # type: ignore[assignment]
     except UnexpectedToken as failure:
         raise SyntaxFailure(_explain(source, held, failure.token)) from None
     return result

@@ -11,7 +11,7 @@ from gibiane_ops.kernels.estimate.contact import densities
 from gibiane_ops.values.champs import DIFFUS, ChPoint, MChaml
 from gibiane_ops.values.contact import solved_contacts
 from gibiane_ops.values.modele import Modele
-from gibiane_ops.values.nodes import node_store
+from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
 COFR = operator(
     "COFR",
@@ -45,7 +45,7 @@ COFR = operator(
 )
 def _cofr(ctx: Context, mc: Modele, u: ChPoint, rea: ChPoint, matc: MChaml | None, lump: bool) -> ChPoint:
     store = node_store(ctx)
-    columns: dict[str, list[tuple[object, object]]] = {}
+    columns: dict[str, list[tuple[IntArray, FloatArray]]] = {}
     for zone in solved_contacts(ctx, mc, matc, u, rea):
         nodes = zone.pairs.pairs[:, 0]
         dim = zone.frames.shape[1]
@@ -69,7 +69,7 @@ def _cofr(ctx: Context, mc: Modele, u: ChPoint, rea: ChPoint, matc: MChaml | Non
         for name, value in values.items():
             columns.setdefault(name, []).append((nodes, value))
     parts = {
-        name: (np.concatenate([n for n, _ in pieces]), np.concatenate([v for _, v in pieces]))  # type: ignore[misc]
+        name: (np.concatenate([n for n, _ in pieces]), np.concatenate([v for _, v in pieces]))
         for name, pieces in columns.items()
     }
     return ChPoint(store, parts, DIFFUS)

@@ -108,7 +108,7 @@ def _parse(ctx: Context, word: str, kind: type) -> Any:
 
 
 @ENTI.form(Arg("x", NUMBER, "number"), Key(("TRONC", "PROC", "INFE", "SUPE"), "rounding", name="how"), gives=[ENTIER])
-def _enti(ctx: Context, x: Any, how: str | None) -> int:
+def _enti(ctx: Context, x: float, how: str | None) -> int:
     if not math.isfinite(x):
         ctx.fail(26, "{x} has no integer value", at="x", x=x)
     if how == "PROC":

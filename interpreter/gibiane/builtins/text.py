@@ -143,7 +143,7 @@ TEXT = operator("TEXTE", topic="values", summary="keep an instruction as text, r
 @TEXT.stream(syntax="x:MOT|ENTIER|FLOTTANT|TEXTE...", gives=[TEXTE])
 def _text(ctx: Context, q: Operands) -> Texte:
     if len(q.values) == 1 and isinstance(q.values[0], Texte):
-        found = q.values.pop()
+        found: Texte = q.values.pop()
         q.nodes.pop()
         return found
     parts: list[str] = []

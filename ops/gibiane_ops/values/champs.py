@@ -48,7 +48,7 @@ class ChPoint(Value):
     def _merged(self, nodes: IntArray, values: FloatArray) -> Part:
         ids = self.store.canonical(nodes)
         unique, inverse, counts = np.unique(ids, return_inverse=True, return_counts=True)
-        total = np.bincount(inverse, values, minlength=len(unique))
+        total = np.asarray(np.bincount(inverse, values, minlength=len(unique)), np.float64)
         return unique, total if self.nature == DISCRET else total / counts
 
     @property

@@ -32,7 +32,7 @@ class Point(Value):
     @property
     def coords(self) -> FloatArray:
         """Coordinates, (3,), length; a copy."""
-        return self.store.coords[self.node].copy()
+        return np.array(self.store.coords[self.node])
 
     def same(self, other: Any) -> bool:
         """Say whether both are one node."""

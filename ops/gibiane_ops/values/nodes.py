@@ -78,8 +78,5 @@ class NodeStore:
 
 def node_store(owner: Any) -> NodeStore:
     """Return the nodes of a session (or of the session of a context)."""
-    state: dict[str, Any] = owner.state
-    found = state.get("nodes")
-    if found is None:
-        found = state["nodes"] = NodeStore()
-    return found  # type: ignore[no-any-return]
+    found: NodeStore = owner.state.setdefault("nodes", NodeStore())
+    return found
