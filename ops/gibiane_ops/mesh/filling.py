@@ -225,7 +225,11 @@ MAILLER = operator(
     "boundary is kept as it is, node for node; closed parts inside the largest are cavities. The size "
     "inside follows the boundary, a FLOTTANT, or a CHPOINT on the boundary. The same data give the "
     "same mesh. Two bodies that touch: make the common face once, and use it and its copy "
-    "`F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then pair exactly.",
+    "`F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then pair exactly. "
+    "`M T = MAILLER 'PAVE' P1 P2 size` meshes a box; 'CYLI' P1 P2 r a cylinder, 'SPHE' C r a ball, 'DEMI' C r V "
+    "the half of a ball on the side of V (in the plane: rectangle, disc, half disc); 'UNION' or 'MOINS' and another "
+    "solid may follow. `M T = MAILLER 'FICH' name (size)` reads a geometry or a mesh of gmsh, STEP or BREP. "
+    "T.'NOMBRE' is the number of faces, T.'FACE'. i the mesh of face i, T.'name' a group that the file names.",
     example="OPTI DIME 3 ELEM TRI3 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
     "V = S VOLU 2 'TRAN' (0. 0. 1.) ; E = CHAN TRI3 (ENVE V) ; M = MAILLER E ; MESS (MESU M) ;",
     see=["SURFACE", "VOLUME", "REMAILLER"],

@@ -201,7 +201,7 @@ def _volume_inside(g: Maillage) -> float:
     for block in g.blocks:
         kind = shape(block.shape)
         points, weights = kind.mass_gauss
-        X = coords[block.cells] - origin  # noqa: N806  (X: coordinates of cells, as in the kernels)
+        X = coords[block.cells] - origin
         flux = (geometry.positions(kind, X, points) * geometry.normal_densities(kind, X, points)).sum(axis=2)
         total += float((flux @ weights).sum()) / 3
     return total
