@@ -29,7 +29,7 @@ _BLANKS = re.compile(r"\s+")
 
 # What no two runs share: numbers that stand for objects, dates, times of day, durations.
 _MASKS = (
-    (re.compile(r"pointeur \d+"), "pointeur P"),
+    (re.compile(r"\b(pointeur|pointer) \d+"), r"\1 P"),
     (re.compile(r"MAILLAGE +\d+ :"), "MAILLAGE P :"),
     (re.compile(r"\b(?:\d{4}-\d\d-\d\d|\d\d/\d\d/\d{2,4})\b"), "DATE"),
     (re.compile(r"\b\d\d:\d\d:\d\d\b"), "TIME"),

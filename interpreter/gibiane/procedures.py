@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from gibiane import compiled
-from gibiane import slips
+from gibiane import compiled, slips
 from gibiane.binding import ABSENT, Operands
 from gibiane.blocks import annotate, check_structure
 from gibiane.diagnostics import GibianeError, make
@@ -13,7 +12,7 @@ from gibiane.frames import Frame
 from gibiane.nodes import Instr, Literal, Name, Node
 from gibiane.source import SourceText, Span
 from gibiane.syntax import parse
-from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Parameter, Procedure
+from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Parameter, Procedure, Table
 
 if TYPE_CHECKING:
     from gibiane.evaluator import Evaluator
@@ -169,7 +168,18 @@ def _run(ev: Evaluator, frame: Frame, procedure: Procedure, source: SourceText, 
     finally:
         ev.frame = caller
         ev.current = instr
+    if ev.session.options["LOCA"]:
+        _keep_locals(ev, frame, procedure)
     return frame.results
+
+
+def _keep_locals(ev: Evaluator, frame: Frame, procedure: Procedure) -> None:
+    """Keep the names of a finished call in the table `&NAME` (OPTI LOCA)."""
+    kept = Table()
+    for name, value in frame.names.items():
+        if name[0] != "&":
+            kept.set(name, value)
+    ev.frame.names["&" + procedure.name[:23]] = kept
 
 
 def call_with_numbers(ev: Evaluator, procedure: Procedure, values: list[Any], instr: Instr, node: Node) -> list[Any] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -29,7 +29,7 @@ RECURSION_LIMIT = 12_000
 
 def default_options() -> dict[str, Any]:
     """Return the options of a new session (OPTI)."""
-    return {"DIME": 0, "MODE": None, "ELEM": None, "DENS": 0.0, "ECHO": 0, "ERRE": "NORM", "LANG": None,
+    return {"DIME": 0, "MODE": None, "ELEM": None, "DENS": 0.0, "ECHO": 0, "ERRE": "NORM", "LANG": None, "LOCA": False,
             "WARN": False, "EXEC": False, "STRICT": False}
 
 
@@ -58,6 +58,7 @@ class Session:
         self.state: dict[str, Any] = {}
         self.listeners: dict[str, list[Any]] = {}
         self.point_maker: Any = None
+        self.pager: Callable[[str], None] | None = None
         self.library = Library()
         self.worst = 0
         self.internal = False
@@ -80,14 +81,30 @@ class Session:
         """Language of diagnostics: English unless OPTI LANG says otherwise."""
         return "fr" if self.options["LANG"] == "FRAN" else "en"
 
+    def listed(self, template: str, **fields: Any) -> str:
+        """Return a line of a listing: in French as stored outputs are, in English after OPTI LANG ANGL."""
+        if self.options["LANG"] == "ANGL":
+            from gibiane.listings_en import ENGLISH
+
+            template = ENGLISH.get(template, template)
+        return template.format(**fields)
+
     def write(self, line: str) -> None:
         """Write one line of output."""
         self.out.write(line + "\n")
 
+    def page(self, text: str) -> None:
+        """Write a long text, a screen at a time where somebody reads it."""
+        if self.pager is None:
+            self.write(text)
+        else:
+            self.out.flush()
+            self.pager(text)
+
     def emit(self, diagnostic: Diagnostic) -> None:
         """Show a message of any level and remember the highest."""
         self.worst = max(self.worst, diagnostic.level)
-        if diagnostic.level < ERROR and (diagnostic.level == 0 and self.options["ECHO"] < 0):
+        if diagnostic.level < ERROR and self.options["ECHO"] < 0:
             return
         self.out.flush()
         self.err.write(render(diagnostic, colour=self.colour, lang=self.lang) + "\n")

@@ -32,7 +32,7 @@ class Value:
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the lines that LIST prints."""
-        yield f" {self.type_name} de pointeur {session.ordinal(self)}"
+        yield session.listed(" {type} de pointeur {p}", type=self.type_name, p=session.ordinal(self))
 
     def same(self, other: Any) -> bool:
         """Say whether EGA finds both equal (identity unless a type defines its content)."""
@@ -58,7 +58,7 @@ class Annule(Value):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the line that LIST prints."""
-        yield " Objet annule"
+        yield session.listed(" Objet annule")
 
 
 NOTHING = Annule()
@@ -76,7 +76,7 @@ class Texte(Value):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the lines that LIST prints."""
-        yield f" Texte contenant : {self.text}"
+        yield session.listed(" Texte contenant : {x}", x=self.text)
 
 
 class Parameter:
@@ -193,12 +193,12 @@ class Table(Value):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the heading and one line per entry."""
-        yield f" TABLE de pointeur {session.ordinal(self)}"
+        yield session.listed(" TABLE de pointeur {p}", p=session.ordinal(self))
         if brief:
-            yield f"  Nombre d'indices : {len(self.entries)}"
+            yield session.listed("  Nombre d'indices : {n}", n=len(self.entries))
             return
-        yield "            Indice                          Objet"
-        yield "   Type          Valeur            Type          Valeur"
+        yield session.listed("            Indice                          Objet")
+        yield session.listed("   Type          Valeur            Type          Valeur")
         for index, value in self.entries.values():
             left = f"{type_of(index):<8}      {session.brief(index)}"
             yield f"   {left:<32}{type_of(value):<8}      {session.brief(value)}".rstrip()
@@ -216,5 +216,5 @@ class Objet(Value):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the class and the methods."""
-        yield f" OBJET de pointeur {session.ordinal(self)} de classe {self.class_name}"
-        yield f" Methodes : {' '.join(sorted(self.methods))}"
+        yield session.listed(" OBJET de pointeur {p} de classe {name}", p=session.ordinal(self), name=self.class_name)
+        yield session.listed(" Methodes : {names}", names=" ".join(sorted(self.methods)))

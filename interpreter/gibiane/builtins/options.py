@@ -72,6 +72,10 @@ def _anything(ctx: Context, q: Operands) -> Any:
     return value
 
 
+def _switch(ctx: Context, q: Operands) -> bool:
+    return bool(q.need(LOGIQUE))
+
+
 def _file(ctx: Context, q: Operands) -> Any:
     unit = q.read(ENTIER)
     return unit if unit is not None else _word(q)
@@ -106,7 +110,7 @@ OPTIONS: dict[str, Reader] = {
     "SORT": _file, "SAUV": _file, "REST": _file, "ACQU": _acquired, "LECT": _file, "DONN": _input, "IMPR": _file,
     "TRAC": _anything, "FTRA": _file, "EPTR": _anything, "ISOV": _anything, "COUL": _anything, "COSC": _anything,
     "OEIL": _anything, "TITR": _anything, "RESO": _anything, "NORM": _anything, "PREC": _real, "PETI": _real,
-    "GRAN": _real, "ZERO": _real, "VERI": _anything, "IMPI": _anything, "DEBU": _anything, "LOCA": _anything,
+    "GRAN": _real, "ZERO": _real, "VERI": _anything, "IMPI": _anything, "DEBU": _anything, "LOCA": _switch,
     "EPSI": _anything, "INCO": _anything,
 }
 IGNORED = ("POTR", "POLI", "CADR", "SURV", "ATTE", "ASSI", "PARA", "PLAC", "NGMA", "NAVI", "LAGR", "ACCE", "OMEG")
@@ -188,4 +192,4 @@ def _info(ctx: Context, q: Operands) -> None:
         ctx.fail(533, "the name of an operator is wanted", hint="INFO MESS ;")
     value, _ = q.take((ANY,))
     word = getattr(node, "word", None) or (value if isinstance(value, str) else "")
-    ctx.write(notice(ctx, word, node))
+    ctx.session.page(notice(ctx, word, node))

@@ -170,15 +170,15 @@ LIST = operator("LISTER", topic="output", summary="print an object", terminal=Tr
                 example="LIST 5 ; LIST 3.14 ;", see=["MESSAGE"])
 
 
-def _scalar_listing(value: Any) -> str:
+def _scalar_listing(ctx: Context, value: Any) -> str:
     kind = type_of(value)
     if kind == ENTIER:
-        return f" Entier valant: {value}"
+        return ctx.session.listed(" Entier valant: {x}", x=value)
     if kind == FLOTTANT:
-        return f" Reel valant: {general(value).lstrip()}".rstrip()
+        return ctx.session.listed(" Reel valant: {x}", x=general(value).strip())
     if kind == LOGIQUE:
-        return f" Logique valant: {'VRAI' if value else 'FAUX'}"
-    return f" Chaine de {len(value)} caracteres de contenu : {value}"
+        return ctx.session.listed(" Logique valant: {x}", x="VRAI" if value else "FAUX")
+    return ctx.session.listed(" Chaine de {n} caracteres de contenu : {x}", n=len(value), x=value)
 
 
 @LIST.stream(Key("RESU", "abridged"), syntax="x (n:ENTIER) | 'RESU' x | (*'TYPE')")
@@ -194,7 +194,7 @@ def _list(ctx: Context, q: Operands) -> None:
     value, _ = q.take((ANY,))
     width = q.read(ENTIER) if type_of(value).startswith("LIST") else None
     if type(value) in (int, float, bool, str):
-        ctx.write(_scalar_listing(value))
+        ctx.write(_scalar_listing(ctx, value))
         return
     for line in ctx.session.listing(value, brief=brief, width=width):
         ctx.write(line)

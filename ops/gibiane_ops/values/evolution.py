@@ -41,9 +41,12 @@ class Evolution(Value):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the heading, then each curve with its two lists."""
-        yield f" EVOLUTIO de pointeur {session.ordinal(self)} contenant {len(self.curves)} courbe(s)"
+        heading = " EVOLUTIO de pointeur {p} contenant {n} courbe(s)"
+        yield session.listed(heading, p=session.ordinal(self), n=len(self.curves))
         for number, curve in enumerate(self.curves, 1):
-            yield f" Courbe {number} : {curve.title}  type {curve.kind}  couleur {curve.colour}".rstrip()
-            for role, name, values in (("Abscisse", curve.x_name, curve.x), ("Ordonnee", curve.y_name, curve.y)):
-                yield f" {role} : {name}".rstrip(" ")
-                yield from values.listing(session, brief, width)
+            heading = " Courbe {n} : {title}  type {kind}  couleur {colour}"
+            yield session.listed(heading, n=number, title=curve.title, kind=curve.kind, colour=curve.colour)
+            yield session.listed(" Abscisse : {name}", name=curve.x_name).rstrip()
+            yield from curve.x.listing(session, brief, width)
+            yield session.listed(" Ordonnee : {name}", name=curve.y_name).rstrip()
+            yield from curve.y.listing(session, brief, width)

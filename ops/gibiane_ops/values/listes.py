@@ -53,7 +53,8 @@ class ListReel(NumberList):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the heading and the values, ten a line unless told otherwise."""
-        yield f" LISTREEL de pointeur {session.ordinal(self)} contenant {len(self)} reel(s) que voici:"
+        heading = " LISTREEL de pointeur {p} contenant {n} reel(s) que voici:"
+        yield session.listed(heading, p=session.ordinal(self), n=len(self))
         if not brief:
             yield from self._rows([scientific(x) for x in self.values.tolist()], width or REALS_A_LINE)
 
@@ -79,7 +80,8 @@ class ListEnti(NumberList):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the heading and the values, twenty a line unless told otherwise."""
-        yield f" LISTENTI de pointeur {session.ordinal(self)} contenant {len(self)} entier(s) que voici:"
+        heading = " LISTENTI de pointeur {p} contenant {n} entier(s) que voici:"
+        yield session.listed(heading, p=session.ordinal(self), n=len(self))
         if not brief:
             texts = [str(n) for n in self.values.tolist()]
             room = max([5, *map(len, texts)])
@@ -113,10 +115,10 @@ class ListMots(Value):
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the heading and the words, ten a line unless told otherwise."""
-        head = f" LISTMOTS de pointeur {session.ordinal(self)} qui contient {len(self)} mot(s)"
-        yield f"{head} de {WORD_LENGTH} caractere(s)"
+        heading = " LISTMOTS de pointeur {p} qui contient {n} mot(s) de {k} caractere(s)"
+        yield session.listed(heading, p=session.ordinal(self), n=len(self), k=WORD_LENGTH)
         if not brief:
-            yield " Liste des mots :"
+            yield session.listed(" Liste des mots :")
             step = width or WORDS_A_LINE
             for start in range(0, len(self.words), step):
                 line = "".join(f" {word:<{WORD_LENGTH}}" for word in self.words[start : start + step])

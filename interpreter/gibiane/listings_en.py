@@ -1,0 +1,25 @@
+"""What LIST prints, in English (OPTI LANG ANGL), by the French template of the usual listings."""
+
+ENGLISH: dict[str, str] = {
+    " {type} de pointeur {p}": " {type} with pointer {p}",
+    " Objet annule": " Cancelled object",
+    " Entier valant: {x}": " Integer value: {x}",
+    " Reel valant: {x}": " Real value: {x}",
+    " Logique valant: {x}": " Logical value: {x}",
+    " Chaine de {n} caracteres de contenu : {x}": " String of {n} characters containing: {x}",
+    " Texte contenant : {x}": " Text containing: {x}",
+    " TABLE de pointeur {p}": " TABLE with pointer {p}",
+    "  Nombre d'indices : {n}": "  Number of indices: {n}",
+    "            Indice                          Objet": "            Index                           Object",
+    "   Type          Valeur            Type          Valeur": "   Type          Value             Type          Value",
+    " OBJET de pointeur {p} de classe {name}": " OBJET with pointer {p} of class {name}",
+    " Methodes : {names}": " Methods: {names}",
+    " LISTREEL de pointeur {p} contenant {n} reel(s) que voici:": " LISTREEL with pointer {p} containing {n} real(s):",
+    " LISTENTI de pointeur {p} contenant {n} entier(s) que voici:": " LISTENTI with pointer {p} containing {n} integer(s):",
+    " LISTMOTS de pointeur {p} qui contient {n} mot(s) de {k} caractere(s)": " LISTMOTS with pointer {p} containing {n} word(s) of {k} character(s)",
+    " Liste des mots :": " List of words:",
+    " EVOLUTIO de pointeur {p} contenant {n} courbe(s)": " EVOLUTIO with pointer {p} containing {n} curve(s)",
+    " Courbe {n} : {title}  type {kind}  couleur {colour}": " Curve {n}: {title}  type {kind}  colour {colour}",
+    " Abscisse : {name}": " Abscissa: {name}",
+    " Ordonnee : {name}": " Ordinate: {name}",
+}
