@@ -256,3 +256,12 @@ def _exists(ctx: Context, field: Field, name: str | ListMots | None) -> bool:
         return True
     wanted = name.words if isinstance(name, ListMots) else (name.strip(),)
     return set(wanted) <= set(field.names)
+
+
+@extend("ENLEVER").form(
+    Arg("field", FIELD, "field"), Arg("name", (MOT, LISTMOTS), "component"), gives=["CHPOINT|MCHAML"]
+)
+def _without(ctx: Context, field: Field, name: str | ListMots) -> Field:
+    dropped = name.words if isinstance(name, ListMots) else (name.strip(),)
+    pick(ctx, field, list(dropped), list(dropped), lenient=False, at="name")
+    return chosen(field, [n for n in field.names if n not in dropped])

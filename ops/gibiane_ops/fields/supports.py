@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
-from gibiane.values import CHPOINT, FLOTTANT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT
+from gibiane.values import CHPOINT, MAILLAGE, MCHAML, MMODEL, MOT, POINT
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery import nodal_mean
-from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
-from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, restricted
+from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved
+from gibiane_ops.values.algebra import SCAL, SCALAIRE, restricted
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
-from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Block, Maillage, Point
 from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
@@ -129,7 +127,8 @@ REDU = operator(
     notice="`REDU CH G`: a nodal field on the nodes of a mesh, of a point or of another field; an element field on the "
     "elements of a mesh or of a model; a model on the elements of a mesh. The elements of the mesh must be among "
     "those of the field or model.",
-    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (0. 0.) (1. 0.) ; CH = COOR 1 L ;\nMESS (MAXI (REDU CH (L POIN 'INIT'))) ;",
+    example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (0. 0.) (1. 0.) ; CH = COOR 1 L ;\n"
+    "MESS (MAXI (REDU CH (L POIN 'INIT'))) ;",
     see=["EXCO", "ELEM"],
 )
 
@@ -251,76 +250,35 @@ def _intg(ctx: Context, model: Modele, field: MChaml, elem: bool, name: str | No
     return float(sum(z.values.sum() for z in zones))
 
 
-POIN = extend("POINT")
-FIELD = (CHPOINT, MCHAML)
-TESTS: dict[str, Callable[[FloatArray, float], Any]] = {
-    "SUPERIEUR": np.greater,
-    "EGSUPE": np.greater_equal,
-    "EGALE": np.equal,
-    "EGINFE": np.less_equal,
-    "INFERIEUR": np.less,
-    "DIFFERENT": np.not_equal,
-}
-
-
-def _where(ctx: Context, field: Field, test: Callable[[FloatArray], Any], names: list[str]) -> Maillage:
-    """Return the nodes (or new points, for an element field) where some component passes a test."""
-    store = node_store(ctx)
-    if isinstance(field, ChPoint):
-        found = [nodes[test(values)] for name, (nodes, values) in field.parts.items() if name in names]
-        nodes = np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)
-    else:
-        points = [np.zeros((0, 3))]
-        for zone in field.zones:
-            if isinstance(zone.zone, ModelZone):
-                of = shape(zone.zone.shape)
-                passed = np.any([test(zone.component(n)) for n in zone.names if n in names], axis=0)
-                at = geometry.positions(of, store.coords[zone.zone.cells], support_points(of, field.support))
-                points.append(at[passed])
-        nodes = store.add(np.concatenate(points)) if sum(len(p) for p in points) else np.zeros(0, np.int64)
-    if not len(nodes):
-        ctx.warn(26, "no value of the field satisfies the condition: the mesh is empty", at="field")
-    return Maillage.of_nodes(store, nodes)
-
-
-@POIN.form(
-    Arg("field", FIELD, "field"),
-    Key(tuple(TESTS), "condition", Arg("x", FLOTTANT), name="test", required=True),
-    gives=[MAILLAGE],
+GRAD = operator(
+    "GRADIENT",
+    topic="fields",
+    summary="gradient of a nodal field",
+    notice="`GRAD MODL CH`: an element field of sub-type GRADIENT at the stress points, whose component `T,X` is the "
+    "derivative of T by x; of a displacement the components are UX,X UX,Y and so on.",
+    example="""
+    OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0. 0.) (2. 0.)) TRAN 2 (0. 1.) ;
+    MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; G = GRAD MO (NOMC 'T' (COOR 1 S)) ; MESS (MAXI (EXCO 'T,X' G)) ;
+    """,
+    see=["EPSI"],
 )
-def _points_test(ctx: Context, field: Field, test: tuple[str, float]) -> Maillage:
-    word, x = test
-    return _where(ctx, field, lambda v: TESTS[word](v, x), field.names)
 
 
-@POIN.form(
-    Arg("field", FIELD, "field"),
-    Key("COMPRIS", "between two values, included", Arg("low", FLOTTANT), Arg("high", FLOTTANT), required=True),
-    gives=[MAILLAGE],
+@GRAD.form(
+    Arg("model", MMODEL, "model"),
+    Arg("field", CHPOINT, "nodal field"),
+    Arg("cara", MCHAML, "geometry of shells", optional=True),
+    gives=[MCHAML],
 )
-def _points_between(ctx: Context, field: Field, compris: tuple[float, float]) -> Maillage:
-    low, high = compris
-    return _where(ctx, field, lambda v: (v >= low) & (v <= high), field.names)
-
-
-@POIN.form(
-    Arg("field", FIELD, "field"),
-    Key(("MAXI", "MINI"), "extreme value", name="which", required=True),
-    Key("ABS", "of the absolute values"),
-    Key(("AVEC", "SANS"), "components to keep or to drop", Arg("listed", LISTMOTS), name="names"),
-    gives=[MAILLAGE],
-)
-def _points_extreme(ctx: Context, field: Field, which: str, abs: bool, names: tuple[str, ListMots] | None) -> Maillage:
-    kept = field.names
-    if names is not None:
-        kept = [n for n in kept if (n in names[1].words) == (names[0] == "AVEC")]
-    measure: Callable[[FloatArray], FloatArray] = np.abs if abs else np.asarray
-    if isinstance(field, ChPoint):
-        arrays = [values for name, (_, values) in field.parts.items() if name in kept]
-    else:
-        arrays = [z.component(n).ravel() for z in field.zones for n in z.names if n in kept]
-    if not arrays or not sum(map(len, arrays)):
-        ctx.fail(21, "the field has no value", at="field")
-    every = measure(np.concatenate(arrays))
-    extreme = every.max() if which == "MAXI" else every.min()
-    return _where(ctx, field, lambda v: measure(v) == extreme, kept)
+def _grad(ctx: Context, model: Modele, field: ChPoint, cara: MChaml | None) -> MChaml:
+    coords = node_store(ctx).coords
+    zones = []
+    for zone in solid_zones(ctx, model):
+        of = shape(zone.shape)
+        axes = ("R", "Z") if zone.mode == "AXIS" else ("X", "Y", "Z")[: zone.dim]
+        names = [n for n in field.names if len(np.intersect1d(field.parts[n][0], zone.cells))]
+        nodal = field.table(names, zone.cells.ravel()).reshape(*zone.cells.shape, len(names))
+        gradient, _ = geometry.gradients(of, coords[zone.cells][..., : zone.dim], of.gauss[0])
+        values = np.einsum("mqnd,mnc->mqcd", gradient, nodal)
+        zones.append(ChamZone(zone, [f"{n},{a}" for n in names for a in axes], values.reshape(*values.shape[:2], -1)))
+    return MChaml(zones, "GRADIENT", "STRESSES")
