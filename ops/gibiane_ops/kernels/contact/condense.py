@@ -1,7 +1,8 @@
 """Condense an elastic problem on its contact pairs, with one factorisation of the tied bodies.
 
 Change of variables: ``u1 = v + w`` and ``u2 = v`` on a pair. Holding w = 0 ties the bodies, so the matrix of v is that
-of the tied bodies, positive definite as soon as one of them is held. Eliminating v leaves ``S w = f + r``.
+of the tied bodies, positive definite as soon as one of them is held. Eliminating v leaves ``S w = f + r``. A stop
+``c . u <= value`` is one more pair, of which only the normal counts: ``w_n = c . u``, and its gap is the value.
 """
 
 from __future__ import annotations
@@ -18,10 +19,13 @@ from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.interface import FREE_LIMIT, Interface
 from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.kernels.contact.ties import tie
-from gibiane_ops.kernels.errors import SingularSystem
+from gibiane_ops.kernels.errors import SingularSystem, TooLarge
 from gibiane_ops.kernels.solve import Factor, factorize
 
 BoolArray = NDArray[np.bool_]
+
+MEMORY_LIMIT = 4e9
+"""Bytes that the dense interface may take when the caller sets no limit."""
 
 BLOCK = 64
 """Right-hand sides solved together: enough for the dense kernels, few enough to keep the memory low."""
@@ -47,13 +51,20 @@ class Condensation:
     frames: FloatArray
     active: BoolArray
     rigid: FloatArray
+    n_stops: int
     _shortening: FloatArray
     _K: sp.csr_array
     _Kvw: sp.csr_array
     _fields: _Fields
     _reduction: Reduction
 
-    def interface(self, F: FloatArray, offset: FloatArray | None = None) -> Interface:
+    def interface(
+        self,
+        F: FloatArray,
+        offset: FloatArray | None = None,
+        stop_values: FloatArray | None = None,
+        gap: FloatArray | None = None,
+    ) -> Interface:
         """Condense a load and prescribed displacements on the pairs.
 
         Parameters
@@ -62,10 +73,15 @@ class Condensation:
         offset : (n_dofs,) float64, optional
             ``Reduction.offset`` of the same conditions with other prescribed values; those given to ``condense`` when
             left out.
+        stop_values : (n_stops,) float64, optional
+            Largest values of the stops, zero when left out.
+        gap : (n_pairs,) float64, length, optional
+            Initial gaps, those of the pairs when left out.
 
         Returns
         -------
         Interface
+            The pairs, then the stops.
 
         Cost
         ----
@@ -79,18 +95,31 @@ class Condensation:
         # prescribed displacements of both nodes of a pair: part of the gap is already used up
         d = self.active.shape[1]
         slave, master = self.contact.pairs.T
-        imposed = (U0.reshape(-1, d)[slave] - U0.reshape(-1, d)[master]) * self.contact.normals
-        gap = (self.contact.gap - imposed.sum(axis=1)) / self._shortening
+        moved = U0.reshape(-1, d)
+        relative = moved[slave] - np.where(master[:, None] >= 0, moved[master], 0.0)
+        start = self.contact.gap if gap is None else gap
+        start = (start - (relative * self.contact.normals).sum(axis=1)) / self._shortening
+        stops = np.zeros(self.n_stops) if stop_values is None else stop_values
 
         def expand(w: FloatArray) -> FloatArray:
             flat = np.ravel(w)
             x = x0 - self.factor.solve(self._Kvw @ flat)
             return np.asarray(fields.Bv @ x + fields.Bw @ flat + U0)
 
-        return Interface(self.S, f, gap, self.frames, self.active, self.rigid, self.kref, expand)
+        return Interface(
+            self.S, f, np.concatenate([start, stops]), self.frames, self.active, self.rigid, self.kref, expand
+        )
 
 
-def condense(K: sp.csr_array, contact: ContactPairs, reduction: Reduction, *, method: str = "auto") -> Condensation:
+def condense(
+    K: sp.csr_array,
+    contact: ContactPairs,
+    reduction: Reduction,
+    *,
+    stops: sp.csr_array | None = None,
+    method: str = "auto",
+    memory_limit: float = MEMORY_LIMIT,
+) -> Condensation:
     """Factorise the tied bodies and compute the Schur complement on the contact pairs.
 
     Parameters
@@ -101,8 +130,12 @@ def condense(K: sp.csr_array, contact: ContactPairs, reduction: Reduction, *, me
         Pairs of all zones.
     reduction : Reduction
         Conditions other than contact, from ``reduce_conditions`` with one column of prescribed values.
+    stops : (n_stops, n_dofs) CSR, optional
+        Unilateral conditions ``stops @ u <= value``, independent of each other and of the conditions of ``reduction``.
     method : str
         Package, see ``factorize``.
+    memory_limit : float
+        Bytes that the dense interface may take.
 
     Returns
     -------
@@ -115,7 +148,10 @@ def condense(K: sp.csr_array, contact: ContactPairs, reduction: Reduction, *, me
     BadValue
         When pairs close a loop, so that their relative displacements are not independent.
     ContradictoryConditions
-        When a linear relation holds a relative displacement alone, other than component by component.
+        When a linear relation holds a relative displacement alone, other than component by component, or a stop acts
+        on what the conditions or another stop already hold.
+    TooLarge
+        When the dense interface would take more than ``memory_limit``.
 
     Notes
     -----
@@ -128,9 +164,18 @@ def condense(K: sp.csr_array, contact: ContactPairs, reduction: Reduction, *, me
     """
     d = contact.normals.shape[1]
     n_dofs = K.shape[0]
+    n_stops = 0 if stops is None else stops.shape[0]
+    needed = interface_memory(len(contact.pairs) + n_stops, d)
+    if needed > memory_limit:
+        raise TooLarge(f"the dense interface of {len(contact.pairs) + n_stops} pairs", needed, memory_limit)
     Bv, Bw, B0, free = tie(n_dofs, d, contact.pairs, reduction.fixed)
     frames, active, shortening = local_frames(contact.normals, free)
-    fields = _Fields.of(Bv, sp.csr_array(Bw @ _to_global(frames, active)), B0, reduction)
+    Bw = sp.csr_array(Bw @ _to_global(frames, active))
+    if stops is not None and n_stops:
+        Bw = sp.hstack([Bw, sp.csr_array((n_dofs, n_stops * d))], format="csr")
+        frames = np.concatenate([frames, np.broadcast_to(np.eye(d), (n_stops, d, d))])
+        active = np.concatenate([active, np.broadcast_to(np.arange(d) == 0, (n_stops, d))])
+    fields = _Fields.of(Bv, Bw, B0, reduction, stops, d)
     KBw = K @ fields.Bw
     Kvw = sp.csr_array(fields.Bv.T @ KBw)
     try:
@@ -139,11 +184,38 @@ def condense(K: sp.csr_array, contact: ContactPairs, reduction: Reduction, *, me
         moving = np.unique(fields.Bv[:, error.unknowns].nonzero()[0])
         raise SingularSystem(f"tied bodies: {error.message}", np.unique(moving // d), moving) from error
     S = _schur(factor, Kvw, (fields.Bw.T @ KBw).toarray(), np.flatnonzero(active.ravel()))
-    kref = float(np.diag(S)[active.ravel()].mean()) if active.any() else 1.0
+    kref = _natural_stiffness(K, S, active)
     inactive = np.flatnonzero(~active.ravel())
     S[inactive, inactive] = kref
-    rigid = _free_motions(S, contact, frames, active, kref)
-    return Condensation(contact, factor, S, kref, frames, active, rigid, shortening, K, Kvw, fields, reduction)
+    candidates = np.eye(len(S))[:, active.ravel()] if n_stops else _rigid_candidates(contact, frames, active)
+    values, vectors = np.linalg.eigh(candidates.T @ S @ candidates)
+    rigid = np.asarray(candidates @ vectors[:, values < FREE_LIMIT * kref])
+    return Condensation(
+        contact, factor, S, kref, frames, active, rigid, n_stops, shortening, K, Kvw, fields, reduction
+    )  # fmt: skip
+
+
+def _natural_stiffness(K: sp.csr_array, S: FloatArray, active: BoolArray) -> float:
+    """Average the active diagonal of S, or that of K when every relative motion is rigid."""
+    if not active.any():
+        return 1.0
+    mean, elastic = float(np.diag(S)[active.ravel()].mean()), float(K.diagonal().mean())
+    return mean if mean > FREE_LIMIT * elastic else elastic
+
+
+def interface_memory(n_pairs: int, dim: int) -> float:
+    """Predict the memory of the dense interface: S, its scaled copies and the matrix of a Newton step.
+
+    Parameters
+    ----------
+    n_pairs, dim : int
+
+    Returns
+    -------
+    float
+        Bytes.
+    """
+    return 5 * 8.0 * (n_pairs * dim) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,14 +231,27 @@ class _Fields:
     tie_matrix: sp.csr_array
 
     @staticmethod
-    def of(Bv: sp.csr_array, Bw: sp.csr_array, B0: sp.csr_array, reduction: Reduction) -> _Fields:
-        """Add the linear relations, ``u[tied] = relation u[free] + offset[tied]``, as conditions on v given w."""
+    def of(
+        Bv: sp.csr_array, Bw: sp.csr_array, B0: sp.csr_array, reduction: Reduction, stops: sp.csr_array | None, d: int
+    ) -> _Fields:
+        """Add the linear relations, ``u[tied] = relation u[free] + offset[tied]``, as conditions on v given w.
+
+        A stop adds ``c . u = w_n``, w_n being the first component of its pair, and the pairs of stops are the last.
+        """
         n_dofs, tied = reduction.n, reduction.tied
         select = sp.eye_array(n_dofs, format="csr")
         relations = sp.csr_array(select[tied] - reduction.relation @ select[reduction.free])
-        if not len(tied):
+        unit = sp.csr_array((len(tied), Bw.shape[1]))
+        if stops is not None and stops.shape[0]:
+            n_stops = stops.shape[0]
+            own = sp.csr_array(
+                (np.ones(n_stops), (np.arange(n_stops), Bw.shape[1] - d * np.arange(n_stops, 0, -1))),
+                (n_stops, Bw.shape[1]),
+            )
+            relations, unit = sp.vstack([relations, stops], format="csr"), sp.vstack([unit, own], format="csr")
+        if not relations.shape[0]:
             return _Fields(Bv, Bw, B0, reduction.fixed, tied, relations, Bv)
-        right = sp.csc_array(-(relations @ Bw))
+        right = sp.csc_array(unit - relations @ Bw)
         touched = np.flatnonzero(np.diff(right.indptr))
         second = reduce_conditions(relations @ Bv, right[:, touched].toarray())
         chosen = sp.eye_array(Bv.shape[1], format="csr")
@@ -179,8 +264,10 @@ class _Fields:
     def constant(self, offset: FloatArray) -> FloatArray:
         """Compute the displacement at x = 0 and w = 0."""
         U0 = np.asarray(self.B0 @ offset[self.fixed])
-        if len(self.tied):
-            rest = offset[self.tied] - self.relations @ U0
+        if self.relations.shape[0]:
+            values = np.zeros(self.relations.shape[0])
+            values[: len(self.tied)] = offset[self.tied]
+            rest = values - self.relations @ U0
             U0 = U0 + self.tie_matrix @ reduce_conditions(self.relations @ self.tie_matrix, rest).offset
         return U0
 
@@ -200,14 +287,14 @@ def _schur(factor: Factor, Kvw: sp.csr_array, S: FloatArray, columns: IntArray) 
 def _to_global(frames: FloatArray, active: BoolArray) -> sp.csr_array:
     """Give the matrix from active local components to global ones, block diagonal."""
     n, d = active.shape
+    if not n:
+        return sp.csr_array((0, 0))
     blocks = np.where(active[:, None, :], np.swapaxes(frames, 1, 2), 0.0)
     return sp.bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(n * d, n * d)).tocsr()
 
 
-def _free_motions(
-    S: FloatArray, contact: ContactPairs, frames: FloatArray, active: BoolArray, kref: float
-) -> FloatArray:
-    """Find the relative rigid motions without stiffness, zone by zone, as an orthonormal basis."""
+def _rigid_candidates(contact: ContactPairs, frames: FloatArray, active: BoolArray) -> FloatArray:
+    """Span the relative rigid motions of each zone that blocked components allow, by an orthonormal basis."""
     modes = [
         np.einsum("nij,njk->nik", frames, _rigid_modes(contact.points, contact.zone == zone)).reshape(active.size, -1)
         for zone in np.unique(contact.zone)
@@ -219,8 +306,7 @@ def _free_motions(
         _, values, Vt = np.linalg.svd(blocked, full_matrices=True)
         at_rest = np.r_[values, np.zeros(len(Vt) - len(values))] <= FREE_LIMIT
         candidates = _orthonormal(candidates @ Vt[at_rest].T)
-    values, vectors = np.linalg.eigh(candidates.T @ S @ candidates)
-    return np.asarray(candidates @ vectors[:, values < FREE_LIMIT * kref])
+    return candidates
 
 
 def _rigid_modes(points: FloatArray, member: BoolArray) -> FloatArray:

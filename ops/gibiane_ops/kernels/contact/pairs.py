@@ -27,7 +27,7 @@ class ContactPairs:
     Attributes
     ----------
     pairs : (n, 2) int64
-        Slave node (body 1) and master node (body 2).
+        Slave node (body 1) and master node (body 2); -1 for a rigid obstacle, which has no unknowns.
     normals : (n, d) float64
         Unit outward normals of body 1.
     gap : (n,) float64, length

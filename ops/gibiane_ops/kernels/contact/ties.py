@@ -22,7 +22,7 @@ def tie(
     n_dofs, d : int
         Unknowns, and components of a node.
     pairs : (n, 2) int64
-        Slave and master nodes.
+        Slave and master nodes; a master of -1 is the ground, which does not move.
     fixed : (n_fixed,) int64
         Unknowns that are prescribed.
 
@@ -44,6 +44,12 @@ def tie(
     Each group of unknowns that pairs connect starts from a prescribed one, or from a master's, and the others follow
     pair by pair; a node may so be slave in one zone and master in another.
     """
+    if (pairs < 0).any():
+        # the ground is one more node, prescribed; its unknowns are the last
+        ground = n_dofs + np.arange(d)
+        whole = np.where(pairs < 0, n_dofs // d, pairs)
+        Bv, Bw, B0, free = tie(n_dofs + d, d, whole, np.concatenate([fixed, ground]))
+        return Bv[:n_dofs], Bw[:n_dofs], B0[:n_dofs, : len(fixed)], free
     component = np.arange(d)
     slave, master = (d * pairs[:, :1] + component).ravel(), (d * pairs[:, 1:] + component).ravel()
     known = np.zeros(n_dofs, dtype=bool)
