@@ -38,6 +38,7 @@ G_CODES = {
     "G406": "contact statuses cycle",
     "G407": "conditions contradict each other",
     "G408": "disconnected pieces",
+    "G409": "conditions left aside",
     "G410": "prescribed error out of reach",
     "G411": "estimate not guaranteed",
     "G412": "no progress between passes",

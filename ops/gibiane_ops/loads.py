@@ -1,280 +1,33 @@
-"""Conditions (BLOQ, SYMT, ANTI, DEPI) and loads (FORC, PRES, FSUR)."""
+"""Loads: FORC, PRES, FSUR, CNEQ."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from gibiane.binding import Operands
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MMODEL, MOT, POINT, RIGIDITE
-
-from gibiane_ops.kernels import assembly
+from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, MMODEL, POINT
+from gibiane_ops.kernels import assembly, topology
 from gibiane_ops.kernels.contact.pairs import facets_of_body
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
-from gibiane_ops.values.champs import DISCRET, ChPoint
+from gibiane_ops.kernels.supports import moved
+from gibiane_ops.values.champs import DISCRET, ChPoint, MChaml
+from gibiane_ops.values.conditions import family, support
+from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage, Point
-from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
+from gibiane_ops.values.material import MATERIAL, on_zone, properties, solid_zones
+from gibiane_ops.values.mechanics import corners
+from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
-from gibiane_ops.values.rigidite import ConditionPart, Rigidite
 
-KNOWN = {"UX", "UY", "UZ", "UR", "RX", "RY", "RZ", "RT", "T"}
 _EXAMPLE = (
     "OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
 )
-
-
-def family(ctx: Context) -> str:
-    """Return the key of the tables of names for the current mode."""
-    mode = ctx.option("MODE") or {2: "PLAN DEFO", 3: "TRID"}.get(int(ctx.option("DIME")))
-    if mode is None:
-        ctx.fail(14, "the dimension of space is not set", hint="OPTI DIME 3 ;")
-    return str(mode)[:4]
-
-
-def support(ctx: Context, place: Maillage | Point) -> IntArray:
-    """Return the nodes of a mesh or of a point."""
-    nodes = place.nodes if isinstance(place, Maillage) else np.array([place.node])
-    if not len(nodes):
-        ctx.fail(26, "the mesh has no node", at="g")
-    return nodes
-
-
-def condition(ctx: Context, nodes: IntArray, names: list[str], label: str, sense: str = "=") -> Rigidite:
-    """Make one condition per node and name: the unknown takes the value imposed (0 by default)."""
-    store = node_store(ctx)
-    row = np.arange(len(nodes) * len(names))
-    node = np.tile(nodes, len(names))
-    multipliers = store.add(store.coords[node])
-    name = np.repeat(np.asarray(names), len(nodes))
-    return Rigidite([ConditionPart(row, node, name, np.ones(len(row)), multipliers, sense, label)])
-
-
-def directed(ctx: Context, nodes: IntArray, direction: FloatArray, names: tuple[str, ...], label: str) -> Rigidite:
-    """Make one condition per node: the displacement along a direction takes the value imposed."""
-    store = node_store(ctx)
-    length = float(np.linalg.norm(direction))
-    if length == 0:
-        ctx.fail(239, "the direction is null")
-    unit = direction / length
-    used = [i for i in range(len(names)) if abs(unit[i]) > 1e-12]
-    n = len(nodes)
-    row = np.tile(np.arange(n), len(used))
-    node = np.tile(nodes, len(used))
-    name = np.repeat([names[i] for i in used], n)
-    return Rigidite(
-        [ConditionPart(row, node, name, np.repeat(unit[used], n), store.add(store.coords[nodes]), "=", label)]
-    )
-
-
-BLOQ = operator(
-    "BLOQUER",
-    topic="loads",
-    summary="impose displacements",
-    notice="Blocks the unknowns named (UX UY UZ, or 'DEPL' for all displacements) on the nodes of a mesh or "
-    "point: value 0, or the one that DEPI gives. 'DEPL' 'DIRECTION' V blocks the displacement along "
-    "the vector V. One multiplier per node and name.",
-    example=_EXAMPLE + "CL = BLOQ 'DEPL' (S POIN 'DROI' (0 0) (1 0) 1.E-6) ; LIST 'RESU' CL ;",
-    see=["DEPIMPOSE", "SYMT", "REAC"],
-)
-
-
-@BLOQ.stream(
-    Key("DEPL", "all displacements"),
-    Key("DIRECTION", "along a vector", Arg("v", POINT)),
-    syntax="name... | 'DEPL' ('DIRECTION' v:POINT) g:MAILLAGE|POINT",
-    gives=[RIGIDITE],
-)
-def _bloq(ctx: Context, q: Operands) -> Rigidite:
-    names: list[str] = []
-    direction = place = None
-    every = DISPLACEMENTS[family(ctx)]
-    whole = False
-    while True:
-        if direction is not None and isinstance(direction, bool):
-            direction = q.need(POINT, "the direction")
-        found = q.read((MAILLAGE, POINT)) if place is None else None
-        if found is not None:
-            place = found
-            continue
-        several = q.read("LISTMOTS")
-        if several is not None:
-            names.extend(str(w).strip()[:4] for w in several.items)
-            continue
-        i = q.first_word()
-        if i < 0 or q.is_operator_word(i):
-            break
-        node = q.nodes[i]
-        word = str(q.need(MOT)).strip()
-        if word[:4] == "DEPL":
-            whole = True
-        elif word[:4] == "DIRE":
-            direction = True
-        elif word[:4] in ("MINI", "MAXI", "RADI", "ORTH", "ROTA"):
-            ctx.places["word"] = node
-            ctx.fail(251, "BLOQ '{word}' is not available yet", at="word", word=word[:4])
-        elif word[:4] in KNOWN:
-            names.append(word[:4])
-        else:
-            ctx.places["word"] = node
-            ctx.fail(
-                197,
-                "{word} is not the name of an unknown",
-                at="word",
-                word=word,
-                known=" ".join(every),
-                hint="here the unknowns are {known}; 'DEPL' means all of them",
-            )
-    if place is None:
-        raise q.missing(MAILLAGE, "the nodes to block")
-    nodes = support(ctx, place)
-    if direction is not None:
-        return directed(ctx, nodes, direction.coords, every, "BLOQ DIRECTION")
-    if whole:
-        names = [*names, *every]
-    if not names:
-        ctx.fail(
-            7,
-            "which unknown is blocked? A name is missing",
-            known=" ".join(every),
-            hint="here the unknowns are {known}; 'DEPL' means all of them",
-        )
-    return condition(ctx, nodes, list(dict.fromkeys(names)), "BLOQ " + " ".join(names))
-
-
-SYMT = operator(
-    "SYMT",
-    topic="loads",
-    summary="conditions of symmetry about a line or a plane",
-    notice="The nodes of the mesh in the plane of three points (line of two in the plane) do not move "
-    "normally to it. A node counts within the tolerance: a tenth of the density, or a millionth of "
-    "the size of the mesh.",
-    example=_EXAMPLE + "CL = SYMT 'DEPL' (0 0) (0 1) S ; LIST 'RESU' CL ;",
-    see=["BLOQUER", "ANTI"],
-)
-ANTI = operator(
-    "ANTI",
-    topic="loads",
-    summary="conditions of antisymmetry about a line or a plane",
-    notice="The nodes of the mesh in the plane of three points (line of two in the plane) do not move along "
-    "it. Tolerance as for SYMT.",
-    example=_EXAMPLE + "CL = ANTI 'DEPL' (0 0) (0 1) S ; LIST 'RESU' CL ;",
-    see=["BLOQUER", "SYMT"],
-)
-
-
-def _plane_normal(ctx: Context, p1: Point, p2: Point, p3: Point | None) -> FloatArray:
-    a, b = p1.coords, p2.coords
-    if int(ctx.option("DIME")) == 2:
-        along = b - a
-        normal = np.array([-along[1], along[0], 0.0])
-    else:
-        if p3 is None:
-            raise ctx.operands.missing(POINT, "the third point of the plane")
-        normal = np.cross(b - a, p3.coords - a)
-    length = np.linalg.norm(normal)
-    if length == 0:
-        ctx.fail(237, "the points do not define a plane: they coincide or are aligned", at="p1")
-    return np.asarray(normal / length)
-
-
-def _in_plane(ctx: Context, g: Maillage, p1: Point, normal: FloatArray, tol: float | None) -> IntArray:
-    store = node_store(ctx)
-    nodes = g.nodes
-    X = store.coords[nodes]
-    if tol is None:
-        density = float(ctx.option("DENS"))
-        tol = density / 10 if density > 0 else 1e-6 * float(np.ptp(X, axis=0).max(initial=0.0))
-    near = nodes[np.abs((X - p1.coords) @ normal) <= tol]
-    if not len(near):
-        ctx.fail(221, "no node of the mesh lies in the plane (tolerance {tol})", at="g", tol=f"{tol:g}")
-    return np.asarray(near)
-
-
-_SYMMETRY = (
-    Key("DEPL", "displacements (the default)"),
-    Key("ROTA", "rotations"),
-    Arg("p1", POINT, "point of the plane"),
-    Arg("p2", POINT, "point of the plane"),
-    Arg("p3", POINT, "point of the plane", optional=True),
-    Arg("g", MAILLAGE, "mesh"),
-    Arg("tol", FLOTTANT, "tolerance", optional=True),
-)
-
-
-@SYMT.form(*_SYMMETRY, gives=[RIGIDITE])
-def _symt(
-    ctx: Context, depl: bool, rota: bool, p1: Point, p2: Point, p3: Point | None, g: Maillage, tol: float | None
-) -> Rigidite:
-    normal = _plane_normal(ctx, p1, p2, p3)
-    nodes = _in_plane(ctx, g, p1, normal, tol)
-    names = DISPLACEMENTS[family(ctx)]
-    axis = int(np.argmax(np.abs(normal)))
-    if abs(abs(normal[axis]) - 1.0) < 1e-12:
-        return condition(ctx, nodes, [names[axis]], "SYMT")
-    return directed(ctx, nodes, normal, names, "SYMT")
-
-
-@ANTI.form(*_SYMMETRY, gives=[RIGIDITE])
-def _anti(
-    ctx: Context, depl: bool, rota: bool, p1: Point, p2: Point, p3: Point | None, g: Maillage, tol: float | None
-) -> Rigidite:
-    normal = _plane_normal(ctx, p1, p2, p3)
-    nodes = _in_plane(ctx, g, p1, normal, tol)
-    names = DISPLACEMENTS[family(ctx)]
-    first = np.asarray(p2.coords - p1.coords)
-    parts = directed(ctx, nodes, first, names, "ANTI").parts
-    if int(ctx.option("DIME")) == 3:
-        parts += directed(ctx, nodes, np.cross(normal, first), names, "ANTI").parts
-    return Rigidite(parts)
-
-
-DEPI = operator(
-    "DEPIMPOSE",
-    topic="loads",
-    summary="values of imposed displacements",
-    notice="The second member of conditions: a value for all of them, or a CHPOINT with the unknowns that "
-    "BLOQ names. To be added to the load.",
-    example=_EXAMPLE + "CL = BLOQ 'UY' (S POIN 'DROI' (0 0) (1 0) 1.E-6) ; LIST 'RESU' (DEPI CL 0.01) ;",
-    see=["BLOQUER"],
-)
-
-
-@DEPI.form(Arg("k", RIGIDITE, "conditions"), Arg("x", FLOTTANT, "value"), gives=[CHPOINT])
-def _depi(ctx: Context, k: Rigidite, x: float) -> ChPoint:
-    rows = _rows(ctx, k)
-    nodes = np.concatenate([part.multipliers for part in rows])
-    return ChPoint(node_store(ctx), {"FLX": (nodes, np.full(len(nodes), x))}, DISCRET)
-
-
-@DEPI.form(Arg("k", RIGIDITE, "conditions"), Arg("field", CHPOINT, "values"), gives=[CHPOINT])
-def _depi_field(ctx: Context, k: Rigidite, field: ChPoint) -> ChPoint:
-    nodes, values = [], []
-    for part in _rows(ctx, k):
-        store = node_store(ctx)
-        total = np.zeros(len(part.multipliers))
-        for name in np.unique(part.name):
-            if str(name) not in field.names:
-                ctx.fail(181, "the field has no component {name}", at="field", name=str(name))
-            terms = part.name == name
-            np.add.at(
-                total,
-                part.row[terms],
-                part.coefficients[terms] * field.at(str(name), store.canonical(part.node[terms])),
-            )
-        nodes.append(part.multipliers)
-        values.append(total)
-    return ChPoint(node_store(ctx), {"FLX": (np.concatenate(nodes), np.concatenate(values))}, DISCRET)
-
-
-def _rows(ctx: Context, k: Rigidite) -> list[ConditionPart]:
-    if not k.conditions:
-        ctx.fail(26, "this matrix holds no condition", at="k", hint="BLOQ makes conditions")
-    return k.conditions
-
 
 FORC = operator(
     "FORCE",
@@ -323,37 +76,55 @@ PRES = operator(
     topic="loads",
     summary="nodal forces of a pressure",
     notice="Consistent forces of a pressure on facets of the boundary of the model; positive, it pushes into "
-    "the solid, whichever way the facets turn. The pressure is a number or a CHPOINT (one component).",
+    "the solid, whichever way the facets turn. The pressure is a number or a CHPOINT (one component); without "
+    "facets the CHPOINT acts on those of the boundary that have all their nodes in it. In mode AXIS the forces are "
+    "those of the whole body of revolution.",
     example=_EXAMPLE + "F = PRES 'MASS' MO 1.E6 (CONT S ELEM 'APPU' 'STRI' (S POIN 'DROI' (0 1) (1 1) 1.E-6)) ;\n"
     "LIST F ;",
-    see=["FORCE", "FSUR"],
+    see=["FORCE", "FSUR", "CNEQ"],
 )
 FSUR = operator(
     "FSUR",
     topic="loads",
-    summary="nodal forces of a traction on facets",
-    notice="Consistent forces of a uniform force per unit of area (of length in the plane) on facets of the model.",
+    summary="nodal forces of a surface traction",
+    notice="Consistent forces of a force per unit of area: a vector, or a CHPOINT with the names of forces (FX FY FZ, "
+    "FR FZ in mode AXIS), on facets of the boundary; without facets the CHPOINT acts on those of the boundary that "
+    "have all their nodes in it.",
     example=_EXAMPLE + "F = FSUR 'MASS' MO (0 -1.E6) (CONT S ELEM 'APPU' 'STRI' (S POIN 'DROI' (0 1) (1 1) 1.E-6)) ;\n"
     "LIST F ;",
-    see=["PRESSION"],
+    see=["PRESSION", "FORCE", "CNEQ"],
 )
+CNEQ = operator(
+    "CNEQ",
+    topic="loads",
+    summary="nodal forces of a force per unit of volume",
+    notice="`CNEQ MODL CH`: the consistent forces of a CHPOINT or MCHAML whose components are forces per unit of volume "
+    "(FX FY FZ, FR FZ in mode AXIS), such as a weight: density times gravity. Bars want their section too: "
+    "`CNEQ MODL CH CAR`, with SECT in CAR.",
+    example=_EXAMPLE + "F = CNEQ MO (MANU 'CHPO' S 'FY' (-9.81 * 7800.)) ; LIST (RESU F) ;",
+    see=["FORCE", "PRESSION", "MASSE"],
+)
+MASSIVE = Key("MASS", "on a solid", required=True)
+Loaded = list[tuple[str, IntArray]]
 
 
-def _sum(ctx: Context, dim: int, names: tuple[str, ...], parts: list[tuple[IntArray, FloatArray]]) -> ChPoint:
-    nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in parts]))
-    local = [(np.searchsorted(nodes, cells), forces) for cells, forces in parts]
-    total = assembly.assemble_vector(len(nodes), dim, local).reshape(len(nodes), dim)
-    return ChPoint.from_table(node_store(ctx), names, nodes, total, DISCRET)
+def _sum(ctx: Context, zone: ModelZone, blocks: list[tuple[IntArray, FloatArray]]) -> ChPoint:
+    """Return the field of the forces of elements, (m, n, d) each."""
+    nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in blocks]))
+    local = [(np.searchsorted(nodes, cells), forces) for cells, forces in blocks]
+    total = assembly.assemble_vector(len(nodes), zone.dim, local).reshape(-1, zone.dim)
+    return ChPoint.from_table(node_store(ctx), FORCES[zone.family], nodes, total, DISCRET)
 
 
-def _body(ctx: Context, model: Modele) -> tuple[int, tuple[str, ...], list[tuple[str, IntArray]]]:
-    if not model.zones:
+def _solids(ctx: Context, model: Modele) -> list[ModelZone]:
+    """Return the zones that fill the space (bars have no facets)."""
+    zones = [zone for zone in model.zones if not zone.bars]
+    if not zones:
         ctx.fail(26, "this model has no solid", at="model")
-    zone = model.zones[0]
-    return zone.dim, FORCES[zone.family], [(z.shape, z.cells) for z in model.zones]
+    return zones
 
 
-def _check_facets(ctx: Context, g: Maillage, dim: int) -> None:
+def _checked_facets(ctx: Context, g: Maillage, dim: int) -> Loaded:
     wrong = [b.shape for b in g.blocks if shape(b.shape).dim != dim - 1]
     if wrong or not g.n_cells:
         ctx.fail(
@@ -363,57 +134,144 @@ def _check_facets(ctx: Context, g: Maillage, dim: int) -> None:
             shapes=", ".join(wrong) or "an empty mesh",
             hint="FACE, ENVE or CONT give the facets of a solid; ELEM 'APPU' chooses among them",
         )
+    return g.kernel_blocks
+
+
+def _facets_in(ctx: Context, zones: list[ModelZone], field: ChPoint) -> Loaded:
+    """Return the facets of the boundary that have all their nodes in a field."""
+    boundary = topology.boundary([(z.shape, z.cells) for z in zones])
+    inside = {name: facets.nodes[np.isin(facets.nodes, field.nodes).all(axis=1)] for name, facets in boundary.items()}
+    found = [(name, cells) for name, cells in inside.items() if len(cells)]
+    if not found:
+        ctx.fail(
+            21,
+            "no facet of the boundary of the model has all its nodes in the field",
+            at="field",
+            hint="give the field on a part of the boundary, or the facets after it",
+        )
+    return found
 
 
 @PRES.form(
-    Key("MASS", "on a solid", required=True),
+    MASSIVE,
     Arg("model", MMODEL, "model"),
     Arg("p", FLOTTANT, "pressure"),
     Arg("g", MAILLAGE, "facets"),
     gives=[CHPOINT],
 )
 def _pres(ctx: Context, mass: bool, model: Modele, p: float, g: Maillage) -> ChPoint:
-    return _pressure(ctx, model, g, lambda cells: p)
+    zones = _solids(ctx, model)
+    return _pressure(ctx, zones, _checked_facets(ctx, g, zones[0].dim), lambda cells: p)
 
 
 @PRES.form(
-    Key("MASS", "on a solid", required=True),
+    MASSIVE,
     Arg("model", MMODEL, "model"),
-    Arg("p", CHPOINT, "pressure field"),
-    Arg("g", MAILLAGE, "facets"),
+    Arg("field", CHPOINT, "pressure"),
+    Arg("g", MAILLAGE, "facets", optional=True),
     gives=[CHPOINT],
 )
-def _pres_field(ctx: Context, mass: bool, model: Modele, p: ChPoint, g: Maillage) -> ChPoint:
-    if len(p.names) != 1:
-        ctx.fail(26, "the pressure has several components", at="p")
-    return _pressure(ctx, model, g, lambda cells: p.at(p.names[0], cells.ravel()).reshape(cells.shape))
+def _pres_field(ctx: Context, mass: bool, model: Modele, field: ChPoint, g: Maillage | None) -> ChPoint:
+    if len(field.names) != 1:
+        ctx.fail(26, "the pressure has several components", at="field")
+    zones = _solids(ctx, model)
+    facets = _facets_in(ctx, zones, field) if g is None else _checked_facets(ctx, g, zones[0].dim)
+    name = field.names[0]
+    return _pressure(ctx, zones, facets, lambda cells: field.at(name, cells.ravel()).reshape(cells.shape))
 
 
-def _pressure(ctx: Context, model: Modele, g: Maillage, value: Any) -> ChPoint:
-    dim, names, body = _body(ctx, model)
-    _check_facets(ctx, g, dim)
-    X = node_store(ctx).coords[:, :dim]
+def _pressure(ctx: Context, zones: list[ModelZone], facets: Loaded, value: Callable[[IntArray], Any]) -> ChPoint:
+    zone = zones[0]
+    x = node_store(ctx).coords[:, : zone.dim]
     try:
-        turned = facets_of_body(body, g.kernel_blocks)
+        turned = facets_of_body([(z.shape, z.cells) for z in zones], facets)
     except EmptyContact as failure:
         ctx.fail(21, "{reason}", at="g", reason=failure.reason, hint="is the model made of the solid that has them?")
-    return _sum(ctx, dim, names, [(c, assembly.pressure_load(shape(n), X[c], value(c))) for n, c in turned])
+    with worded(ctx, at="g"):
+        forces = [
+            (c, assembly.pressure_load(shape(n), x[c], value(c), axisymmetric=zone.axisymmetric)) for n, c in turned
+        ]
+    return _sum(ctx, zone, forces)
+
+
+def _named_forces(ctx: Context, zone: ModelZone, field: ChPoint | MChaml) -> None:
+    """Refuse a field that holds anything but forces of this mode."""
+    known = FORCES[zone.family]
+    wrong = [name for name in field.names if name not in known]
+    if wrong:
+        ctx.fail(
+            197,
+            "{name} is not a force here; the forces are {known}",
+            at="field",
+            name=wrong[0],
+            known=" ".join(known),
+        )
 
 
 @FSUR.form(
-    Key("MASS", "on a solid", required=True),
+    MASSIVE,
     Arg("model", MMODEL, "model"),
     Arg("v", POINT, "traction"),
     Arg("g", MAILLAGE, "facets"),
     gives=[CHPOINT],
 )
 def _fsur(ctx: Context, mass: bool, model: Modele, v: Point, g: Maillage) -> ChPoint:
-    dim, names, _ = _body(ctx, model)
-    _check_facets(ctx, g, dim)
-    X = node_store(ctx).coords[:, :dim]
-    return _sum(
-        ctx,
-        dim,
-        names,
-        [(b.cells, assembly.distributed_load(shape(b.shape), X[b.cells], v.coords[:dim])) for b in g.blocks],
-    )
+    zone = _solids(ctx, model)[0]
+    return _traction(ctx, zone, _checked_facets(ctx, g, zone.dim), lambda cells: v.coords[: zone.dim])
+
+
+@FSUR.form(
+    MASSIVE,
+    Arg("model", MMODEL, "model"),
+    Arg("field", CHPOINT, "traction"),
+    Arg("g", MAILLAGE, "facets", optional=True),
+    gives=[CHPOINT],
+)
+def _fsur_field(ctx: Context, mass: bool, model: Modele, field: ChPoint, g: Maillage | None) -> ChPoint:
+    zones = _solids(ctx, model)
+    zone = zones[0]
+    _named_forces(ctx, zone, field)
+    facets = _facets_in(ctx, zones, field) if g is None else _checked_facets(ctx, g, zone.dim)
+    return _traction(ctx, zone, facets, lambda cells: _nodal(zone, field, cells))
+
+
+def _nodal(zone: ModelZone, field: ChPoint, cells: IntArray) -> FloatArray:
+    """Return the forces of a nodal field at the nodes of elements, (m, n, d)."""
+    return field.table(FORCES[zone.family], cells.ravel()).reshape(*cells.shape, zone.dim)
+
+
+def _traction(ctx: Context, zone: ModelZone, facets: Loaded, value: Callable[[IntArray], FloatArray]) -> ChPoint:
+    x = node_store(ctx).coords[:, : zone.dim]
+    with worded(ctx, at="g"):
+        forces = [
+            (c, assembly.distributed_load(shape(n), x[c], value(c), axisymmetric=zone.axisymmetric)) for n, c in facets
+        ]
+    return _sum(ctx, zone, forces)
+
+
+@CNEQ.form(
+    Arg("model", MMODEL, "model"),
+    Arg("field", (CHPOINT, MCHAML), "force per unit of volume"),
+    Arg("cara", MCHAML, "section of bars", optional=True, subtype=MATERIAL),
+    gives=[CHPOINT],
+)
+def _cneq(ctx: Context, model: Modele, field: ChPoint | MChaml, cara: MChaml | None) -> ChPoint:
+    forces = []
+    for zone in solid_zones(ctx, model):
+        _named_forces(ctx, zone, field)
+        if isinstance(field, ChPoint):
+            density = _nodal(zone, field, zone.cells)
+        else:
+            values, of = on_zone(ctx, field, zone, "field"), shape(zone.shape)
+            table = np.zeros((*values.values.shape[:2], zone.dim))
+            table[..., [FORCES[zone.family].index(n) for n in values.names]] = values.values
+            density = moved(of, table, field.support, "NOEUD")
+        if zone.bars:
+            if cara is None:
+                raise ctx.operands.missing(MCHAML, "the section of the bars (CARA MODL 'SECT' ...)")
+            density = density * properties(ctx, cara, zone, ("SECT",), "cara")[..., None, None]
+        x = corners(ctx, zone)
+        with worded(ctx, at="model"):
+            each = assembly.distributed_load(shape(zone.shape), x, density, axisymmetric=zone.axisymmetric)
+        forces.append((zone.cells, each))
+    return _sum(ctx, model.zones[0], forces)

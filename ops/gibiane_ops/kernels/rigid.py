@@ -42,6 +42,44 @@ def rigid_modes(points: FloatArray, centre: FloatArray | None = None) -> FloatAr
     return modes.reshape(n * dim, -1)
 
 
+def dependent_motion(points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Express the displacements of a rigid body by as few of them as determine the others.
+
+    Parameters
+    ----------
+    points : (n, dim) float64, length
+        dim 2 or 3.
+
+    Returns
+    -------
+    masters : (k,) int64
+        Unknowns ``dim i + c`` that can be chosen freely: 3 in the plane and 6 in space, fewer for aligned or
+        coincident points.
+    followers : (n dim - k,) int64
+        The others, increasing.
+    coefficients : (n dim - k, k) float64
+        ``u[followers] = coefficients . u[masters]`` in every rigid motion of first order.
+
+    Notes
+    -----
+    The masters are the pivots of a QR factorisation with column pivoting of the rigid modes, so that they stand far
+    from each other and the coefficients stay of order one.
+    """
+    from scipy.linalg import qr
+
+    centre = points.mean(axis=0)
+    radius = float(np.abs(points - centre).max(initial=0.0)) or 1.0
+    modes = rigid_modes((points - centre) / radius)
+    _, R, order = qr(modes.T, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    k = int((diagonal > 1e-10 * diagonal[0]).sum())
+    masters = np.sort(order[:k]).astype(np.int64)
+    followers = np.setdiff1d(np.arange(modes.shape[0]), masters)
+    coefficients, *_ = np.linalg.lstsq(modes[masters].T, modes[followers].T, rcond=None)
+    coefficients[np.abs(coefficients) < 1e-12] = 0.0
+    return masters, followers, np.asarray(coefficients.T, np.float64)
+
+
 @dataclass(frozen=True, eq=False)
 class FreeMotion:
     """A rigid motion that nothing stops.

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from gibiane.values import RIGIDITE, Value
 
+from gibiane.values import RIGIDITE, Value
 from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.modele import ContactZone
@@ -52,6 +52,8 @@ class ConditionPart:
         "=", "<" (at most) or ">" (at least).
     label : str
         What the user wrote, for messages (BLOQ UX).
+    line : int
+        Line of the instruction that made them, 0 when unknown.
     """
 
     def __init__(
@@ -63,6 +65,7 @@ class ConditionPart:
         multipliers: IntArray,
         sense: str,
         label: str,
+        line: int = 0,
     ) -> None:
         self.row = row
         self.node = node
@@ -71,6 +74,12 @@ class ConditionPart:
         self.multipliers = multipliers
         self.sense = sense
         self.label = label
+        self.line = line
+
+    @property
+    def origin(self) -> str:
+        """The label and the line where it was written."""
+        return f"{self.label} (line {self.line})" if self.line else self.label
 
 
 class ContactPart:

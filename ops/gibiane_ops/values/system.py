@@ -6,12 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
-from gibiane.registry import Context
 
+from gibiane.registry import Context
 from gibiane_ops.kernels.contact.pairs import ContactPairs, joined
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore, node_store
 from gibiane_ops.values.rigidite import ConditionPart, ContactPart, Rigidite
+
+ROTATIONS = {"RX", "RY", "RZ", "RT"}
 
 
 @dataclass(eq=False)
@@ -126,7 +128,7 @@ class System:
 
 
 def build(ctx: Context, rigidity: Rigidite) -> System:
-    """Number the unknowns of a RIGIDITE and gather its matrices and conditions."""
+    """Give numbers to the unknowns of a RIGIDITE and gather its matrices and conditions."""
     store = node_store(ctx)
     if not rigidity.matrices:
         ctx.fail(26, "there is no stiffness among these conditions", at="k", hint="RIGI makes it from a model")
@@ -144,7 +146,8 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
         K = K + matrix if number else matrix
     rows, cols, data, multipliers = [], [], [], []
     start = 0
-    for condition in rigidity.conditions:
+    conditions = _applicable(ctx, rigidity.conditions, names)
+    for condition in conditions:
         ids = store.canonical(condition.node)
         place = np.minimum(np.searchsorted(nodes, ids), len(nodes) - 1)
         lost = nodes[place] != ids
@@ -152,9 +155,9 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
             where = " ".join(f"{x:g}" for x in store.coords[ids[lost][0]])
             ctx.fail(
                 53,
-                "{label}: {count} of its nodes have no stiffness, the first at ({where})",
+                "{which}: {count} of its nodes have no stiffness, the first at ({where})",
                 at="k",
-                label=condition.label,
+                which=condition.origin,
                 count=int(lost.sum()),
                 where=where,
             )
@@ -162,9 +165,9 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
         if unknown:
             ctx.fail(
                 197,
-                "{label}: the matrix has no unknown {name}; it has {known}",
+                "{which}: the matrix has no unknown {name}; it has {known}",
                 at="k",
-                label=condition.label,
+                which=condition.origin,
                 name=unknown[0],
                 known=" ".join(names),
             )
@@ -190,10 +193,25 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
         duals,
         K,
         C,
-        rigidity.conditions,
+        conditions,
         rigidity.contacts,
         np.concatenate([empty_ids, *multipliers]),
     )
+
+
+def _applicable(ctx: Context, conditions: list[ConditionPart], names: tuple[str, ...]) -> list[ConditionPart]:
+    """Leave aside the conditions on rotations alone when the matrix has no rotation (`BLOQ 'DEPL' 'ROTA'`, SYMT)."""
+    if any(n in ROTATIONS for n in names):
+        return conditions
+    kept = [c for c in conditions if not set(np.unique(c.name).tolist()) <= ROTATIONS]
+    if len(kept) < len(conditions):
+        ctx.warn(
+            "G409",
+            "{count} conditions on rotations are left aside: the matrix has no rotation",
+            level=0,
+            count=sum(len(c.multipliers) for c in conditions if c not in kept),
+        )
+    return kept
 
 
 def _renumbered(matrix: sp.csr_array, place: IntArray, size: int) -> sp.csr_array:

@@ -50,18 +50,34 @@ def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray
     return np.asarray(xi, np.float64)
 
 
+def overshoot(name: str, xi: FloatArray) -> FloatArray:
+    """Tell how far reference points lie outside the reference element.
+
+    Parameters
+    ----------
+    name : str
+        Shape.
+    xi : (k, dim) float64
+
+    Returns
+    -------
+    (k,) float64
+        The largest violation of the inequalities of the element; negative or zero inside.
+    """
+    kind = shape(name)
+    out = np.maximum(kind.ref_nodes.min(axis=0) - xi, xi - kind.ref_nodes.max(axis=0)).max(axis=1, initial=-np.inf)
+    if name.startswith(("TRI", "TET", "TE1")):
+        out = np.maximum(out, xi.sum(axis=1) - 1)
+    elif name.startswith(("PRI", "PR1")):
+        out = np.maximum(out, xi[:, :2].sum(axis=1) - 1)
+    elif name.startswith(("PYR", "PY1")):
+        out = np.maximum(out, np.abs(xi[:, :2]).max(axis=1) - 1 + xi[:, 2])
+    return np.asarray(out, np.float64)
+
+
 def _in_reference(name: str, xi: FloatArray, tolerance: float) -> BoolArray:
     """Tell which reference points are in the reference element, up to a tolerance."""
-    kind = shape(name)
-    below, beyond = kind.ref_nodes.min(axis=0) - xi, xi - kind.ref_nodes.max(axis=0)
-    inside = np.maximum(below, beyond).max(axis=1) <= tolerance
-    if name.startswith(("TRI", "TET", "TE1")):
-        inside &= xi.sum(axis=1) <= 1 + tolerance
-    elif name.startswith(("PRI", "PR1")):
-        inside &= xi[:, :2].sum(axis=1) <= 1 + tolerance
-    elif name.startswith("PY"):
-        inside &= np.abs(xi[:, :2]).max(axis=1) <= 1 - xi[:, 2] + tolerance
-    return np.asarray(inside, np.bool_)
+    return np.asarray(overshoot(name, xi) <= tolerance, np.bool_)
 
 
 def containing(name: str, X: FloatArray, x: FloatArray, tolerance: float = 1e-9) -> IntArray:
