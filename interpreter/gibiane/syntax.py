@@ -2,58 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from functools import cache
-from importlib.resources import files
 from typing import Any
 
-from lark import Lark, Transformer, UnexpectedToken
-from lark.lexer import Lexer
+from lark import UnexpectedToken
 
 from gibiane.diagnostics import Diagnostic, Label, Text, make
 from gibiane.lexer import Token, tokens
 from gibiane.nodes import NAME_LENGTH, Access, Group, Instr, Literal, Name, Node, Target
+from gibiane.parser import leaf, parser
 from gibiane.source import SourceText, Span
-
-
-class _Ready(Lexer):
-    """A lexer for tokens that are already made."""
-
-    def __init__(self, _conf: Any) -> None:
-        pass
-
-    def lex(self, data: Iterable[Token]) -> Iterator[Token]:  # type: ignore[override]
-        return iter(data)
-
-
-def _leaf(token: Token) -> Node:
-    if token.type == "NAME":
-        return Name(str(token.value), token.start_pos, token.end_pos)
-    if token.type == "ACCESS":
-        return Access(str(token.value), token.start_pos, token.end_pos)
-    return Literal(token.value, token.start_pos, token.end_pos, quoted=token.type == "STRING")
-
-
-class _Build(Transformer[Token, Any]):
-    """Grammar rules to nodes, applied while parsing."""
-
-    def sequence(self, items: list[Any]) -> list[Node]:
-        return [_leaf(item) if type(item) is Token else item for item in items]
-
-    def group(self, parts: list[Any]) -> Node:
-        return Group(parts[1], parts[0].start_pos, parts[2].end_pos)
-
-    def directive(self, parts: list[Any]) -> tuple[list[Node] | None, list[Node]]:
-        return None, parts[0]
-
-    def assignment(self, parts: list[Any]) -> tuple[list[Node] | None, list[Node]]:
-        return parts[0], parts[2]
-
-
-@cache
-def _parser() -> Lark:
-    grammar = files("gibiane").joinpath("grammar.lark").read_text(encoding="utf-8")
-    return Lark(grammar, parser="lalr", lexer=_Ready, transformer=_Build())
 
 
 class SyntaxFailure(Exception):
@@ -101,7 +58,7 @@ def _instruction(source: SourceText, held: list[Token], end: int, errors: dict[i
             instr.targets = _targets(source, left, held)
     except SyntaxFailure as failure:
         instr.bad = failure.diagnostic
-        instr.items = [_leaf(t) for t in held if t.type in ("NAME", "STRING", "NUMBER")]
+        instr.items = [leaf(t) for t in held if t.type in ("NAME", "STRING", "NUMBER")]
     if lexical:
         unclosed = [at for at in lexical if errors[at].code == "G102"]  # it explains the others
         instr.bad = errors[min(unclosed or lexical)]
@@ -114,7 +71,7 @@ def _instruction(source: SourceText, held: list[Token], end: int, errors: dict[i
 
 def _grouped(source: SourceText, held: list[Token]) -> tuple[list[Node] | None, list[Node]]:
     try:
-        result: tuple[list[Node] | None, list[Node]] = _parser().parse(held)  # type: ignore[assignment]
+        result: tuple[list[Node] | None, list[Node]] = parser().parse(held)  # type: ignore[assignment]
     except UnexpectedToken as failure:
         raise SyntaxFailure(_explain(source, held, failure.token)) from None
     return result
