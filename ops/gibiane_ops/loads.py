@@ -98,8 +98,8 @@ CNEQ = operator(
     "CNEQ",
     topic="loads",
     summary="nodal forces of a force per unit of volume",
-    notice="`CNEQ MODL CH`: the consistent forces of a CHPOINT or MCHAML whose components are forces per unit of volume "
-    "(FX FY FZ, FR FZ in mode AXIS), such as a weight: density times gravity. Bars want their section too: "
+    notice="`CNEQ MODL CH`: the consistent forces of a CHPOINT or MCHAML whose components are forces per unit of "
+    "volume (FX FY FZ, FR FZ in mode AXIS), such as a weight: density times gravity. Bars want their section too: "
     "`CNEQ MODL CH CAR`, with SECT in CAR.",
     example=_EXAMPLE + "F = CNEQ MO (MANU 'CHPO' S 'FY' (-9.81 * 7800.)) ; LIST (RESU F) ;",
     see=["FORCE", "PRESSION", "MASSE"],

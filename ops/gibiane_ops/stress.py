@@ -22,6 +22,7 @@ from gibiane_ops.values.material import (
     STRESS,
     elastic_compliance,
     elastic_law,
+    expansion,
     on_zone,
     solid_zones,
     told_apart,
@@ -64,6 +65,52 @@ def _epsi(ctx: Context, model: Modele, u: ChPoint, how: str | None, noer: bool) 
     _check_linear(ctx, how)
     zones = [ChamZone(z, z.strains, mechanics.strains(ctx, z, u)) for z in solid_zones(ctx, model)]
     return MChaml(zones, STRAIN, "STRESSES")
+
+
+EPTH = operator(
+    "EPTHERMIQUE",
+    topic="fields",
+    summary="thermal strains of a temperature field",
+    notice="`EPTH MODL MAT T`: ALPH (T - TALP) along every axis (ALP1 ALP2 ALP3 along those of an orthotropic "
+    "material) at the stress points; T is a CHPOINT or MCHAML with the component T, TALP is 0 unless MATE gives it. "
+    "Between a reference temperature TREF and T: EPTH of T minus EPTH of TREF. With EP = EPTH MODL MAT T, "
+    "BSIG MODL (ELAS MODL EP MAT) is the load, SIGM MODL MAT U - (ELAS MODL EP MAT) the stress.",
+    example=BLOCK + "MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 'ALPH' 1.E-5 ;\n"
+    "MESS (MAXI (EPTH MO MA (MANU 'CHPO' V 'T' 100.))) ;",
+    see=["ELAS", "BSIGMA", "MATERIAU"],
+)
+
+
+@EPTH.form(
+    Arg("model", MMODEL, "model"),
+    Arg("material", MCHAML, "material", subtype=MATERIAL),
+    Arg("t", (CHPOINT, MCHAML), "temperature"),
+    gives=[MCHAML],
+)
+def _epth(ctx: Context, model: Modele, material: MChaml, t: ChPoint | MChaml) -> MChaml:
+    zones = []
+    for zone in solid_zones(ctx, model):
+        heated = _temperature(ctx, zone, t)
+        known = on_zone(ctx, material, zone, "material")
+        if "TALP" in known.names:
+            heated = heated - known.component("TALP")[:, :1]
+        by_degree = expansion(ctx, material, zone, "material")
+        strain = heated[..., None] * (by_degree if by_degree.ndim == 1 else by_degree[:, None, :])
+        zones.append(ChamZone(zone, zone.strains, strain))
+    return MChaml(zones, STRAIN, "STRESSES")
+
+
+def _temperature(ctx: Context, zone: ModelZone, t: ChPoint | MChaml) -> FloatArray:
+    """Return temperatures at the stress points, (m, q)."""
+    of = shape(zone.shape)
+    names = t.names if isinstance(t, ChPoint) else on_zone(ctx, t, zone, "t").names
+    name = "T" if "T" in names else names[0] if len(names) == 1 else None
+    if name is None:
+        ctx.fail(181, "the field has no component T; it has {known}", at="t", known=" ".join(names) or "none")
+    if isinstance(t, ChPoint):
+        nodal = t.at(name, zone.cells.ravel()).reshape(*zone.cells.shape, 1)
+        return moved(of, nodal, "NOEUD", "STRESSES")[..., 0]
+    return moved(of, on_zone(ctx, t, zone, "t").component(name)[..., None], t.support, "STRESSES")[..., 0]
 
 
 SIGM = operator(
