@@ -36,6 +36,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "ENVELOPPE": ("gibiane_ops.mesh.volumes",),
     "POINT": ("gibiane_ops.mesh.selection", "gibiane_ops.fields.places"),
     "NBEL": ("gibiane_ops.mesh.selection",),
+    "NOEUD": ("gibiane_ops.mesh.selection",),
     "NBNO": ("gibiane_ops.mesh.selection",),
     "COULEUR": ("gibiane_ops.mesh.selection",),
     "ELIMINATION": ("gibiane_ops.mesh.merging",),
@@ -150,7 +151,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "DEFORME": ("gibiane_ops.output.shapes",),
     "VECTEUR": ("gibiane_ops.output.shapes",),
     "TRACER": ("gibiane_ops.output.trace",),
-    "DESSIN": ("gibiane_ops.output.draw",),
+    "DESSINER": ("gibiane_ops.output.draw",),
     # operators of the language with further forms
     "ET": ("gibiane_ops.lists.access", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
     "EXISTE": ("gibiane_ops.fields.components", "gibiane_ops.lists.sorting"),
