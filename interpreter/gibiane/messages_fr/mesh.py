@@ -131,8 +131,6 @@ MESH = {
     "give the line itself: CONT and ELEM 'COMP' extract it": "donner la ligne elle-même : CONT et ELEM 'COMP' l'extraient",
     "the two lines have {first} and {second} elements: as many are wanted": "les deux lignes ont {first} et {second} éléments : il en faut autant",
     "{second} elements": "{second} éléments",
-    "opposite sides have {first} and {second} elements: as many are wanted": "des côtés opposés ont {first} et {second} éléments : il en faut autant",
-    "SURF fills a contour whose sides differ": "SURF remplit un contour dont les côtés diffèrent",
     "the contour is not closed: side 4 does not end where side 1 begins": "le contour n'est pas fermé : le côté 4 ne finit pas où commence le côté 1",
     "they must share their end points: the same POINT, or ELIM for points at one place": "ils doivent avoir leurs bouts en commun : le même POINT, ou ELIM pour des points au même endroit",
     "the sides do not follow one another: side {number} does not begin where side {before} ends": "les côtés ne se suivent pas : le côté {number} ne commence pas où finit le côté {before}",

@@ -25,6 +25,7 @@ from gibiane_ops.mesh.building import (
     new_mesh,
     nodes_of,
 )
+from gibiane_ops.mesh.degree import LINEAR, linear_mesh, quadratic_mesh
 from gibiane_ops.values.listes import ListEnti
 from gibiane_ops.values.maillage import Block, Maillage, Point
 
@@ -35,6 +36,8 @@ CHAN = operator(
     notice="`G2 = CHAN TYPE G` gives a mesh on the same nodes made of elements of a type: POI1 (its points, each "
     "once), SEG2 or LIGNE (its edges), SURFACE (its facets), TRI3 (quadrangles cut in two), PRI6 (cubes cut "
     "in two), TET4 (volumes cut in tetrahedra), or the same elements. Without TYPE, that of OPTI ELEM. "
+    "'QUADRATIQUE' gives the elements mid-nodes (a type such as CU20 or TE10 cuts them first), one per edge "
+    "for all the meshes that share its ends; 'LINEAIRE' drops them. "
     "Cuts start from the corner of smallest number, so that neighbours fit, and so do a volume and its "
     "surface changed apart. Recorded sides and faces follow. `CHAN TYPE G LENTI` makes elements of a mesh "
     "of points: the list numbers its points, as many as an element has, element by element.",
@@ -83,7 +86,6 @@ CUTTERS: dict[str, Cutter] = {
     "QUA4": _keep("QUA4"),
     "CUB8": _keep("CUB8"),
     "PYR5": _keep("PYR5"),
-    "LINEAIRE": _same,
 }
 KINDS = (
     "POI1",
@@ -92,7 +94,7 @@ KINDS = (
     "SURFACE",
     "LINEAIRE",
     "QUADRATIQUE",
-    *(k for k in CUTTERS if k != "LINEAIRE"),
+    *CUTTERS,
     *SECOND_DEGREE,
 )
 
@@ -133,6 +135,12 @@ def _connect(ctx: Context, kind: str | None, g: Maillage, numbers: ListEnti) -> 
 @CHAN.form(Key(KINDS, "type of the elements", name="kind"), Arg("g", MAILLAGE, "mesh"), gives=[MAILLAGE])
 def _changer(ctx: Context, kind: str | None, g: Maillage) -> Maillage:
     target = _target(ctx, kind)
+    if target == "QUADRATIQUE":
+        return quadratic_mesh(ctx, g)
+    if target == "LINEAIRE":
+        return linear_mesh(ctx, g)
+    if target in LINEAR:
+        return quadratic_mesh(ctx, _changer(ctx, LINEAR[target], linear_mesh(ctx, g)))
     if target == "POI1":
         return Maillage.of_nodes(g.store, g.nodes_in_order())
     if target in ("SEG2", "LIGNE"):
@@ -146,8 +154,6 @@ def _target(ctx: Context, kind: str | None) -> str:
     target = kind or ctx.option("ELEM")
     if target is None:
         ctx.fail(16, "to which type of elements?", hint="CHAN TRI3 G, or set OPTI ELEM")
-    if target in SECOND_DEGREE or target == "QUADRATIQUE":
-        ctx.fail(251, "elements of second degree ({element}) are not available yet", element=target)
     return str(target)
 
 

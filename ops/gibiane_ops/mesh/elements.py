@@ -117,8 +117,8 @@ def _between(ctx: Context, g: Maillage, compris: tuple[Point, Point]) -> Maillag
 
 @ELEM.stream(
     Key(("TYPE", "COUL"), "types or colours, as a LISTMOTS; 'COUL' N the elements of a colour"),
-    *(Key(name, "elements of this type") for name in ELEMENTS),
-    *(Key(name, "elements of this colour") for name in COLOURS),
+    Key(ELEMENTS, "elements of this type", name="type"),
+    Key(COLOURS, "elements of this colour", name="colour"),
     syntax="g:MAILLAGE (TYPE) (COLOUR) (n:ENTIER|LISTENTI)",
     gives=["MAILLAGE|LISTMOTS"],
 )

@@ -173,6 +173,24 @@ def _make(ctx: Context, x: float, y: float | None, z: float | None, dens: float 
     return Point(store, int(store.add([values], ctx.option("DENS") if dens is None else dens)[0]))
 
 
+NOEU = operator(
+    "NOEUD",
+    topic="mesh",
+    summary="point of a given number",
+    notice="`P = NOEU N`: numbers are those that LIST shows; they change when nodes are merged.",
+    example="OPTI DIME 2 ; P = 3. 4. ; MESS (COOR 2 (NOEU 1)) ;",
+    see=["POINT"],
+)
+
+
+@NOEU.form(Arg("n", ENTIER, "number"), gives=[POINT])
+def _noeud(ctx: Context, n: int) -> Point:
+    store = nodes_of(ctx)
+    if not 1 <= n <= store.count:
+        ctx.fail(18, "there is no node {number}: the last is {count}", at="n", number=n, count=store.count)
+    return Point(store, n - 1)
+
+
 NBEL = operator(
     "NBEL",
     topic="mesh",

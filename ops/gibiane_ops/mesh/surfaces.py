@@ -259,9 +259,9 @@ DALL = operator(
     topic="mesh",
     summary="surface between four lines",
     notice="`S = DALL L1 L2 L3 L4 'PLAN'` fills the contour made of four lines that follow one another; opposite "
-    "lines have the same number of elements. 'SPHE' C, 'CYLI' P1 P2, 'CONI' S P put the nodes on a "
-    "sphere, a cylinder or a cone, 'QUEL' leaves them where the lines say. Elements turn as the contour "
-    "does; the four lines are the recorded sides.",
+    "lines have the same number of elements; in a plane they may differ if the sum of the four is even. 'SPHE' C, "
+    "'CYLI' P1 P2, 'CONI' S P put the nodes on a sphere, a cylinder or a cone, 'QUEL' leaves them where the lines "
+    "say. Elements turn as the contour does; the four lines are the recorded sides.",
     example="OPTI DIME 2 ELEM QUA4 ; P1 = 0. 0. ; P2 = 1. 0. ; P3 = 1. 1. ; P4 = 0. 1. ; "
     "S = DALL (DROIT 3 P1 P2) (DROIT 2 P2 P3) (DROIT 3 P3 P4) (DROIT 2 P4 P1) 'PLAN' ; MESS (NBEL S) ;",
     see=["REGLER", "SURFACE", "COTE"],
@@ -281,17 +281,8 @@ def _daller(ctx: Context, l1: Maillage, l2: Maillage, l3: Maillage, l4: Maillage
     store = nodes_of(ctx)
     lines = [line_nodes(ctx, line, name) for line, name in ((l1, "l1"), (l2, "l2"), (l3, "l3"), (l4, "l4"))]
     bottom, right, top, left = _contour(ctx, lines)
-    for first, second, name in ((bottom, top, "l3"), (right, left, "l4")):
-        if len(first) != len(second):
-            ctx.fail(
-                33,
-                "opposite sides have {first} and {second} elements: as many are wanted",
-                at=name,
-                first=len(first) - 1,
-                second=len(second) - 1,
-                label="{second} elements",
-                hint="SURF fills a contour whose sides differ",
-            )
+    if len(bottom) != len(top) or len(right) != len(left):
+        return _transition(ctx, [bottom, right, top, left], on)
     top, left = top[::-1], left[::-1]
     x = store.coords
     grid = transfinite.patch(x[bottom], x[right], x[top], x[left])
@@ -302,6 +293,30 @@ def _daller(ctx: Context, l1: Maillage, l2: Maillage, l3: Maillage, l4: Maillage
     density = store.density
     sizes = float(density[bottom].mean()), float(density[top].mean())
     return _patch(ctx, grid, ids, sizes, np.linspace(0.0, 1.0, len(left)), None, None)
+
+
+def _transition(ctx: Context, sides: list[IntArray], on: Any) -> Maillage:
+    """Fill a plane contour whose opposite sides have different numbers of elements."""
+    from gibiane_ops.mesh.filling import fill_contour
+
+    counts = [len(side) - 1 for side in sides]
+    if sum(counts) % 2 and surface_shape(ctx) == "QUA4":
+        ctx.fail(
+            33,
+            "the sides have {counts} elements: opposite ones differ, and their sum is odd",
+            counts=" ".join(map(str, counts)),
+            hint="give opposite sides as many elements, or change one side by one",
+        )
+    if on is not None and on[0] not in ("PLAN", "QUEL"):
+        ctx.fail(
+            33,
+            "the sides have {counts} elements: opposite ones must have as many on a curved surface",
+            counts=" ".join(map(str, counts)),
+        )
+    segments = np.concatenate([chains.segments_of(side) for side in sides])
+    surface = fill_contour(ctx, segments, None, surface_shape(ctx) == "QUA4", "l1")
+    lines = {str(number): line_between(ctx, side) for number, side in enumerate(sides, 1)}
+    return join([surface], lines)
 
 
 def _contour(ctx: Context, lines: Sequence[IntArray]) -> list[IntArray]:
