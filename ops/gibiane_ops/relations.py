@@ -31,7 +31,7 @@ RELA = operator(
     topic="loads",
     summary="linear relations between unknowns",
     notice="`RELA a1 m1 G1 + a2 m2 G2 - a3 m3 G3`: relation i holds between the unknowns m1 of node i of G1, m2 of "
-    "node i of G2 and so on; a mesh of one node, or a point, stands in all relations. The coefficients are 1 if absent; "
+    "node i of G2 and so on; a mesh of one node, or a point, stands in all relations. A coefficient is 1 if absent; "
     "m is the name of an unknown, or 'DEPL' 'DIRECTION' V ('ROTA' 'DIRECTION' V) for a displacement (rotation) along "
     "a vector. The sum is 0, or the value that DEPI gives; 'MINI': at least, 'MAXI': at most. `RELA CHPO`: one "
     "relation, whose coefficients are the values of the field. 'ENSE' m G: the unknown m is the same on all of G. "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def support(ctx: Context, place: Maillage | Point, at: str | None = "g") -> IntA
 def rows_of(
     ctx: Context,
     points: FloatArray,
-    terms: Sequence[tuple[IntArray, IntArray, Sequence[str] | str, FloatArray]],
+    terms: Sequence[tuple[IntArray, IntArray, Any, FloatArray]],
     label: str,
     sense: str = "=",
 ) -> Rigidite:
@@ -81,7 +82,7 @@ def directed(
     if not length.all():
         ctx.fail(239, "the direction is null", at="direction")
     unit = each / length[:, None]
-    terms: list[tuple[IntArray, IntArray, Sequence[str] | str, FloatArray]] = []
+    terms = []
     for i, name in enumerate(names):
         used = np.flatnonzero(np.abs(unit[:, i]) > NEGLIGIBLE)
         terms.append((used, nodes[used], name, unit[used, i]))

@@ -204,7 +204,8 @@ def _applicable(ctx: Context, conditions: list[ConditionPart], names: tuple[str,
     if any(n in ROTATIONS for n in names):
         return conditions
     kept = [c for c in conditions if not set(np.unique(c.name).tolist()) <= ROTATIONS]
-    if len(kept) < len(conditions):
+    if len(kept) < len(conditions) and not ctx.state.setdefault("rotations told", False):
+        ctx.state["rotations told"] = True
         ctx.warn(
             "G409",
             "{count} conditions on rotations are left aside: the matrix has no rotation",
