@@ -10,6 +10,7 @@ import numpy as np
 
 from gibiane.registry import Context
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.table import SHAPES
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
 from gibiane_ops.kernels.mesh import chains, orientation, subdivision
 from gibiane_ops.values.failures import worded
@@ -19,7 +20,7 @@ from gibiane_ops.values.nodes import NodeStore, node_store
 TRIANGLES = ("TRI3", "TRI6", "TET4", "TE10", "PRI6", "PR15", "PYR5", "PY13")
 SECOND_DEGREE = ("SEG3", "TRI6", "QUA8", "TE10", "PY13", "PR15", "CU20")
 LINES, SURFACES, VOLUMES = ("SEG2",), ("TRI3", "QUA4"), ("TET4", "PYR5", "PRI6", "CUB8")
-DIMENSION = {"POI1": 0, **dict.fromkeys(LINES, 1), **dict.fromkeys(SURFACES, 2), **dict.fromkeys(VOLUMES, 3)}
+DIMENSION = {name: each.dim for name, each in SHAPES.items()}
 
 
 def dimension(ctx: Context) -> int:

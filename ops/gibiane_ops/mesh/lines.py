@@ -26,6 +26,7 @@ from gibiane_ops.mesh.building import (
     reference,
     reversed_mesh,
 )
+from gibiane_ops.mesh.degree import LINEAR, linear_mesh, quadratic_mesh
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
 
@@ -300,6 +301,8 @@ CONT = operator(
     gives=[MAILLAGE],
 )
 def _contour(ctx: Context, g: Maillage, which: str | None, noid: bool) -> Maillage:
+    if not LINEAR.keys().isdisjoint(g.shapes):
+        return quadratic_mesh(ctx, _contour(ctx, linear_mesh(ctx, g), which, noid))
     surface = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 2]
     found = edges.contour(surface, which or "EXTE")
     if len(found) == 0:

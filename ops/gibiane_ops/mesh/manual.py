@@ -23,7 +23,7 @@ MANU = operator(
 
 
 @MANU.form(
-    Key((*DIMENSION, *SECOND_DEGREE), "type of the elements", name="kind", required=True),
+    Key(tuple(DIMENSION), "type of the elements", name="kind", required=True),
     Key(COLOURS, "colour", name="colour"),
     Arg("points", (POINT, MAILLAGE), "points, or meshes of points", many=True),
     gives=[MAILLAGE],
