@@ -62,7 +62,7 @@ def _solid_part(
         for zone, block in zip(solid.zones, solid.blocks, strict=True):
             compliance = elastic_compliance(ctx, material, zone, "mat")
             with worded(ctx, at="model"):
-                errors.append(solid_error(solid.points, block, solid.nodal, compliance))
+                errors.append(solid_error(solid.points, block, solid.nodal, compliance, axisymmetric=zone.axisymmetric))
             zones.append(zone)
     return _Parts(zones, errors)
 

@@ -13,7 +13,7 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
 from gibiane_ops.values.material import STRESS, told_apart
-from gibiane_ops.values.modele import STRESSES, Modele
+from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.smoothed import METHODS, smoothed
 
@@ -71,13 +71,13 @@ def _lisser(
         for zone in solid.zones:
             at_nodes = solid.nodal[np.searchsorted(solid.nodes, zone.cells)]
             values = at_nodes if where != "STRESSES" else moved(shape(zone.shape), at_nodes, "NOEUD", "STRESSES")
-            zones.append(ChamZone(zone, STRESSES[zone.family], values))
+            zones.append(ChamZone(zone, zone.stresses, values))
     return MChaml(zones, STRESS, "STRESSES" if where == "STRESSES" else "NOEUD")
 
 
 def _mean_of_solids(ctx: Context, solids: list[Any]) -> ChPoint:
     nodes = np.unique(np.concatenate([s.nodes for s in solids]))
-    names = STRESSES[solids[0].zones[0].family]
+    names = solids[0].zones[0].stresses
     total, count = np.zeros((len(nodes), len(names))), np.zeros((len(nodes), 1))
     for solid in solids:
         at = np.searchsorted(nodes, solid.nodes)

@@ -5,6 +5,7 @@ MECHANICS = {
     "three LISTMOTS of one length are wanted: components of the first field, of the second, of the result": "il faut trois LISTMOTS de même longueur : composantes du premier champ, du second, du résultat",
     "the divisor is an empty field": "le diviseur est un champ vide",
     "division by zero: {zeros} values of the divisor are zero": "division par zéro : {zeros} valeurs du diviseur sont nulles",
+    "stresses of bars cannot be smoothed: a model of massive elements is wanted": "les contraintes de barres ne se lissent pas : il faut un modèle d'éléments massifs",
     "a nodal field and an element field cannot be put together": "un champ par points et un champ par éléments ne se combinent pas",
     "CHAN makes one from the other": "CHAN fait l'un de l'autre",
     "a real power of {count} negative values": "puissance réelle de {count} valeurs négatives",

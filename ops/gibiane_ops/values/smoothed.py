@@ -74,6 +74,8 @@ def smoothed(ctx: Context, model: Modele, stress: MChaml, method: str, given: MC
     store = node_store(ctx)
     solids = []
     fallbacks = 0
+    if any(z.bars for z in model.zones):
+        ctx.fail(251, "stresses of bars cannot be smoothed: a model of massive elements is wanted", at="model")
     for zones in solids_of(solid_zones(ctx, model)):
         nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
         points = store.coords[nodes][:, : zones[0].dim]

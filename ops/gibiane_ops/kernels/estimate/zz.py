@@ -31,7 +31,9 @@ class SolidError:
     sum_energy: FloatArray
 
 
-def solid_error(points: FloatArray, block: StressBlock, nodal: FloatArray, compliance: FloatArray) -> SolidError:
+def solid_error(
+    points: FloatArray, block: StressBlock, nodal: FloatArray, compliance: FloatArray, *, axisymmetric: bool = False
+) -> SolidError:
     """Compare the stresses of a block with the smoothed stress, cell by cell.
 
     Parameters
@@ -42,6 +44,8 @@ def solid_error(points: FloatArray, block: StressBlock, nodal: FloatArray, compl
         Smoothed stress of the solid, see `recovery.recover`.
     compliance : (c, c) or (m, c, c) float64, length^2 / force
         Inverse of the Hooke law, the same everywhere or one per cell.
+    axisymmetric : bool
+        Whether the cells are sections of a body of revolution, over the whole of which energies are then taken.
 
     Returns
     -------
@@ -56,7 +60,7 @@ def solid_error(points: FloatArray, block: StressBlock, nodal: FloatArray, compl
     ------
     Zienkiewicz and Zhu 1987.
     """
-    xi, density = _integration(block.shape, points[block.cells])
+    xi, density = _integration(block.shape, points[block.cells], axisymmetric)
     smooth = np.matmul(block.shape.N(xi), nodal[block.cells])
     raw = np.broadcast_to(block.stress, smooth.shape)
     return SolidError(
@@ -66,10 +70,13 @@ def solid_error(points: FloatArray, block: StressBlock, nodal: FloatArray, compl
     )
 
 
-def _integration(shape: Shape, X: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _integration(shape: Shape, X: FloatArray, axisymmetric: bool) -> tuple[FloatArray, FloatArray]:
     """Return the points of the rule, (q, dim), and the measures that they carry, (m, q)."""
     rule = shape.stiffness_rule if len(shape.stiffness_rule.weights) > 1 else shape.mass_rule
-    return rule.points, geometry.measure_densities(shape, X, rule.points) * rule.weights
+    density = geometry.measure_densities(shape, X, rule.points) * rule.weights
+    if axisymmetric:
+        density = density * geometry.circumferences(shape, X, rule.points)
+    return rule.points, density
 
 
 def _energy(stress: FloatArray, density: FloatArray, compliance: FloatArray) -> FloatArray:
