@@ -32,7 +32,7 @@ EVOL = operator(
     notice="'MANU': abscissae and ordinates, two lists of the same length, each with a name before it if "
     "wanted; 'LEGE' gives a title, a colour may stand first. 'CHPO': a component along a line.",
     example="E = EVOL 'ROUG' 'MANU' 'TIME' (PROG 0. 1. 2.) 'LOAD' (PROG 0. 5. 7.) ; LIST E ;",
-    see=["DESSINER", "EXTRAIRE", "IPOL"],
+    see=["DESSIN", "EXTRAIRE", "IPOL"],
 )
 
 

@@ -1,7 +1,6 @@
 """Every declared operator is documented, its example runs, and the table of families agrees with the declarations."""
 
 import io
-import os
 from importlib import import_module
 from pathlib import Path
 
@@ -31,15 +30,11 @@ def test_is_documented(op: Operator) -> None:
 
 
 @BY_NAME
-def test_example_runs(op: Operator, tmp_path: Path) -> None:
-    before = Path.cwd()
-    os.chdir(tmp_path)
-    try:
-        out = io.StringIO()
-        session = Session(out=out, err=out)
-        code = session.run_text(op.example, f"example of {op.name}")
-    finally:
-        os.chdir(before)
+def test_example_runs(op: Operator, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    out = io.StringIO()
+    code = Session(out=out, err=out).run_text(op.example, f"example of {op.name}")
     assert code == 0 or "OPTI ERRE IGNO" in op.example, out.getvalue()
 
 
