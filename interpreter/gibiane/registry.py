@@ -45,6 +45,7 @@ class Operator:
         self.symbolic = symbolic
         self.forms: list[Form] = []
         self.pending: list[str] = []
+        self.modules: Sequence[str] = ()
         self.fast: Callable[[Any, Any], Any] | None = None
 
     def form(self, *parts: Arg | Key, gives: Sequence[str] = (), last: bool = False) -> Callable[[Function], Function]:
@@ -76,11 +77,13 @@ class Operator:
     def _add(self, form: Form) -> None:
         if not form.stream and any(_same_operands(form, other) for other in self.forms if not other.stream):
             raise TypeError(f"{self.name}: a form with these operands exists already")
-        at = len(self.forms)
-        if not form.last:
-            while at and self.forms[at - 1].last:
-                at -= 1
-        self.forms.insert(at, form)
+        self.forms.append(form)
+        # the order of the modules decides, whichever of them another operator has made import first
+        self.forms.sort(key=lambda f: (f.last, self._rank(f)))
+
+    def _rank(self, form: Form) -> int:
+        module = form.function.__module__
+        return list(self.modules).index(module) if module in self.modules else -1
 
     def load_more(self) -> bool:
         """Import the next module that adds forms; say whether there was one."""
@@ -97,12 +100,18 @@ class Operator:
 
     def run(self, session: Session, q: Operands, node: Node) -> None:
         """Read operands from the queue by the first form that fits, run it, push its results in front."""
+        if session.interactive and "?" in q.values:
+            self.answer(session, q)
+            return
         misses: list[Mismatch] = []
+        tried: tuple[Form, ...] = ()
         i = 0
         while True:
             if i < len(self.forms) and not (self.forms[i].last and self.pending):
                 form = self.forms[i]
                 i += 1
+                if form in tried:
+                    continue
                 if form.stream:
                     ctx = Context(session, self, q, node, {})
                     result = form.function(ctx, q)
@@ -117,8 +126,21 @@ class Operator:
                     continue
                 q.push_front(_results(result), node)
                 return
+            tried = (*tried, *self.forms[:i])
+            i = 0
             if not self.load_more():
                 raise explain(self, misses, q)
+
+
+    def answer(self, session: Session, q: Operands) -> None:
+        """Write the forms and keywords, asked for by `?` among the operands at the prompt; nothing is run."""
+        for form in self.all_forms():
+            session.write("   " + form.usage(self.name))
+        keys = {word: key.doc for form in self.forms for key in form.keys for word in key.words}
+        for word, doc in sorted(keys.items()):
+            session.write(f"   '{word}' {doc}".rstrip())
+        q.values.clear()
+        q.nodes.clear()
 
 
 class _Refusal:
@@ -203,7 +225,8 @@ def _register(op: Operator) -> Operator:
         raise TypeError(f"operator {op.name} is declared twice")
     table[key] = op
     # its module may be imported for another of its operators, before anyone asks for this one
-    op.pending.extend(m for m in _MODULES.pop(op.name, [])[1:] if m not in sys.modules)
+    op.modules = _MODULES.pop(op.name, [])
+    op.pending.extend(m for m in op.modules[1:] if m not in sys.modules)
     return op
 
 
@@ -234,6 +257,7 @@ def announce(table: Mapping[str, Sequence[str]]) -> None:
     for name, modules in table.items():
         declared = LONG.get(name) or CATALOGUE.get(name[:4])
         if declared is not None:
+            declared.modules = list(modules)
             declared.pending.extend(m for m in modules if m not in declared.pending and m not in sys.modules)
         else:
             _MODULES[name] = list(modules)
