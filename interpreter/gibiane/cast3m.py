@@ -1,4 +1,7 @@
-"""Names of Cast3M 2024 that this program does not have: known by name, so that a script is told what it misses."""
+"""Names of Cast3M 2024, so that a script is told what it misses by the name it uses.
+
+Callers ask only about words that nothing here has: the list holds every name, those that exist here included.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,13 @@ def names() -> dict[str, str]:
     return found
 
 
-def lacks(word: str) -> tuple[str, str] | None:
-    """Return the Cast3M name that `word` means and what is nearest to it here, or None.
+def meant(word: str) -> tuple[str, str] | None:
+    """Return the Cast3M name that `word` stands for there and what is nearest to it here, or None.
 
-    A procedure is meant by its whole name, an operator by its four letters or a longer spelling of them.
+    A procedure is meant by its whole name, an operator by its four letters, or by a longer spelling without digits.
     """
     known = names()
     if word in known:
         return word, known[word]
     key = word[:4]
-    if len(word) >= 4 and key in known and word[4:].isalpha():
-        return key, known[key]
-    return None
+    return (key, known[key]) if len(word) > 4 and key in known and word.isalpha() else None

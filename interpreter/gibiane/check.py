@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from gibiane import slips
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from gibiane import cast3m, slips
 from gibiane.blocks import annotate, block_name, check_structure
 from gibiane.diagnostics import Diagnostic, make
-from gibiane.nodes import Instr
+from gibiane.nodes import Access, Group, Instr, Literal, Name, Node
 from gibiane.source import SourceText
 from gibiane.syntax import parse
 
@@ -74,3 +77,53 @@ def _structure(program: list[Instr]) -> list[Diagnostic]:
 def _loose(found: list[Diagnostic]) -> list[Diagnostic]:
     """Keep what is an error outside procedures too: there a SINON or FINSI without SI is passed over."""
     return [d for d in found if d.code not in ("1020", "1021", "1024")]
+
+
+# ------------------------------------------------------------------------------------------- what a script misses
+
+
+@dataclass
+class Missing:
+    """A name of Cast3M that a text uses and that is not here: where first, how often, what is nearest."""
+
+    name: str
+    near: str
+    line: int
+    count: int = 1
+
+
+def missing_names(source: SourceText, has: Callable[[str], bool]) -> list[Missing]:
+    """Return the operators and procedures of Cast3M that a text calls and that `has` denies, in order of place.
+
+    A word is taken for a call where it is the first word of an instruction or of a parenthesis and the text gives it
+    no value; the name of a procedure wherever it stands.
+    """
+    program = _until_end(parse(source))
+    habits = slips.Habits(program)
+    found: dict[str, Missing] = {}
+    for instr in program:
+        for word, start in _calls(instr.items):
+            meaning = cast3m.meant(word) if not has(word) and not habits.assigns(word) else None
+            if meaning is None:
+                continue
+            name, near = meaning
+            if name in found:
+                found[name].count += 1
+            else:
+                found[name] = Missing(name, near, source.locate(start)[0])
+    return list(found.values())
+
+
+def _calls(items: list[Node]) -> Iterator[tuple[str, int]]:
+    """Yield the words of a sequence that may be calls, with their places."""
+    first = True
+    after_dot = False
+    for item in items:
+        if isinstance(item, Group):
+            yield from _calls(item.items)
+        word = item.word if isinstance(item, Name) else item.value if isinstance(item, Literal) else None
+        if isinstance(word, str) and not after_dot and (word[:1].isalpha() or word[:1] == "@"):
+            if first or (isinstance(item, Name) and len(word) > 4):
+                yield word, item.start
+            first = False
+        after_dot = isinstance(item, Access)

@@ -110,7 +110,8 @@ def _options(arguments: list[str]) -> tuple[dict[str, Any], list[str]]:
             options[word[2:]] = value
             i += 2
             continue
-        if word in ("--strict", "--allow-exec", "--debug", "--version", "--help", "--check", "--bless"):
+        if word in ("--strict", "--allow-exec", "--debug", "--version", "--help", "--check", "--bless",
+                    "--portability"):
             options[word[2:]] = True
         elif word == "-h":
             options["help"] = True
@@ -159,6 +160,7 @@ def _interactive(options: dict[str, Any], script: str | None, assignments: Seque
 
     if script is not None:
         session.run_file(script)
+        session.finished = False
     return run(session)
 
 
@@ -168,12 +170,34 @@ def _check(options: dict[str, Any], files: list[str]) -> int:
     from gibiane.check import problems
 
     session = _session(options, [])
+    missing = 0
     for name in files:
         source = session.open(name)
-        if source is not None:
-            for diagnostic in problems(source):
-                session.emit(diagnostic)
-    return 8 if session.worst >= 2 else 0
+        if source is None:
+            continue
+        for diagnostic in problems(source):
+            session.emit(diagnostic)
+        if options.get("portability"):
+            missing += _portability(session, source)
+    return 8 if session.worst >= 2 or missing else 0
+
+
+def _portability(session: Any, source: Any) -> int:
+    """List the operators and procedures of Cast3M that a script calls and that are not here; return their number."""
+    from gibiane.check import missing_names
+
+    def has(word: str) -> bool:
+        return session.operator(word) is not None or session.library.find(word) is not None
+
+    session.library.directory = source.directory
+    found = missing_names(source, has)
+    names = "name of Cast3M is" if len(found) == 1 else "names of Cast3M are"
+    session.write(f"{source.name}: {len(found) or 'no'} {names} missing here")
+    for item in found:
+        times = "" if item.count == 1 else f", {item.count} times"
+        near = f"  nearest here: {item.near}" if item.near else ""
+        session.write(f"  {item.name:<10} line {item.line}{times}{near}")
+    return len(found)
 
 
 def _info(options: dict[str, Any], names: list[str]) -> int:

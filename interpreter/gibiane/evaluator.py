@@ -159,8 +159,6 @@ class Evaluator:
             return
         if not target.path:
             self.assign_name(target.name, value, instr)
-            if self.session.options["WARN"]:
-                faults.warn_hidden_operator(self, target, instr)
             return
         container = (objects.attribute(self, target.name, instr.at(target)) if target.member
                      else self.frame.lookup(target.name))

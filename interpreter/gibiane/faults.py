@@ -29,7 +29,9 @@ def leftover(ev: Evaluator, q: Operands, at: int, full: Operands | None = None) 
         if found is not None:
             return found
     label = q.describe(at)
-    failure = make(11, "a result of type {type} is left over", type=type_of(q.values[at]), labels=[label], span=label.span)
+    failure = make(
+        11, "a result of type {type} is left over", type=type_of(q.values[at]), labels=[label], span=label.span
+    )
     procedure = _called(ev)
     if procedure is not None:
         failure.hint = Text("does {name} take so many arguments?", {"name": procedure.name})
@@ -37,7 +39,9 @@ def leftover(ev: Evaluator, q: Operands, at: int, full: Operands | None = None) 
     elif len(whole.values) > 1 and all(type_of(v) in (ENTIER, FLOTTANT) for v in whole.values):
         failure.hint = Text("an operator is missing between the values, or a ; between two instructions")
     elif (op := _first_operator(ev)) is not None and isinstance(q.values[at], str):
-        failure.hint = Text("{directive} does not read it: INFO {directive} ; tells what it reads", {"directive": op.name})
+        failure.hint = Text(
+            "{directive} does not read it: INFO {directive} ; tells what it reads", {"directive": op.name}
+        )
     else:
         failure.hint = Text("an operator is missing, or a ; between two instructions")
     return GibianeError(failure)
@@ -53,18 +57,43 @@ def _stopped_by(ev: Evaluator, q: Operands, at: int, unread: Node) -> GibianeErr
         return unknown(ev, q, at, unread)
     if runs and (plain or isinstance(node, Literal)):
         hint = "an operator that follows EXTR, TYPE, CHAI, MOT, LIST or VALE needs parentheses around these"
-        return GibianeError(make(11, "the operator {word} is not run", word=word, span=span,
-                                 labels=[Label(span, Text("the operator before it ends the instruction"))], hint=hint))
+        return GibianeError(
+            make(
+                11,
+                "the operator {word} is not run",
+                word=word,
+                span=span,
+                labels=[Label(span, Text("the operator before it ends the instruction"))],
+                hint=hint,
+            )
+        )
+    if isinstance(node, Literal) and node.quoted and (missing := cast3m.meant(word)) is not None:
+        return GibianeError(q.not_available(at, *missing))
     if isinstance(node, Literal) and word.upper() != word and find(word.upper()) is not None:
-        return GibianeError(make(11, "the word '{word}' is no operator", word=word, span=span, capitals=word.upper(),
-                                 labels=[Label(span, Text("only a word"))],
-                                 hint="a quoted operator is written in capitals: '{capitals}'"))
+        return GibianeError(
+            make(
+                11,
+                "the word '{word}' is no operator",
+                word=word,
+                span=span,
+                capitals=word.upper(),
+                labels=[Label(span, Text("only a word"))],
+                hint="a quoted operator is written in capitals: '{capitals}'",
+            )
+        )
     after = next((i for i in range(at + 1, len(q.values)) if q.is_operator_word(i) or _is_symbol(q, i)), None)
     if after is not None:
         labels = [Label(span, Text("this word stands before it")), Label(q.span(q.nodes[after]), Text("not run"))]
-        return GibianeError(make(11, "the operator {word} is not run: a word stands before it", word=q.values[after],
-                                 labels=labels, span=labels[1].span,
-                                 hint="words follow their operator: ET 'abc' 'def', EGA X 'WORD'"))
+        return GibianeError(
+            make(
+                11,
+                "the operator {word} is not run: a word stands before it",
+                word=q.values[after],
+                labels=labels,
+                span=labels[1].span,
+                hint="words follow their operator: ET 'abc' 'def', EGA X 'WORD'",
+            )
+        )
     return None
 
 
@@ -78,22 +107,24 @@ def unknown(ev: Evaluator, q: Operands, at: int, unread: Node | None = None) -> 
     word, node = q.values[at], q.nodes[at]
     span = q.span(node)
     labels = [Label(span, Text("nothing has this name"))]
-    missing = cast3m.lacks(word)
-    if missing is not None:
-        return not_available(*missing, q, node)
+    missing = cast3m.meant(word)
+    if missing is not None and (missing[0] == word or nearest(word, list(ev.session.names())) is None):
+        return GibianeError(q.not_available(at, *missing))
     if unread is not None and unread is not node:
         labels.append(Label(q.span(unread), Text("not read by anything")))
     close = nearest(word, [*spellings(), *ev.session.names(), *ev.session.library.names()])
     hint = "did you mean {close}?" if close else "is it misspelt, or defined later?"
-    return GibianeError(make(11, "{word} is not the name of an operator, a procedure or an object", word=word,
-                             span=span, labels=labels, hint=hint, close=close))
-
-
-def not_available(name: str, near: str, q: Operands, node: Node) -> GibianeError:
-    """Return the error 251 for an operator or procedure of Cast3M that is not here."""
-    hint = "the nearest thing here: {near}" if near else "gibiane check --portability lists what a script misses"
-    return GibianeError(make(251, "{name} of Cast3M is not available yet", name=name, near=near, hint=hint,
-                             span=q.span(node)))
+    return GibianeError(
+        make(
+            11,
+            "{word} is not the name of an operator, a procedure or an object",
+            word=word,
+            span=span,
+            labels=labels,
+            hint=hint,
+            close=close,
+        )
+    )
 
 
 def stray_access(ev: Evaluator, q: Operands, i: int) -> GibianeError:
@@ -106,8 +137,9 @@ def stray_access(ev: Evaluator, q: Operands, i: int) -> GibianeError:
     if isinstance(node, Name) and value == node.word:
         close = nearest(node.word, list(ev.session.names()))
     what = "only a TABLE has elements" if q.values[i] is DOT else "only an OBJET has methods"
-    return GibianeError(make(11, what, labels=[label], span=label.span, close=close,
-                             hint="did you mean {close}?" if close else None))
+    return GibianeError(
+        make(11, what, labels=[label], span=label.span, close=close, hint="did you mean {close}?" if close else None)
+    )
 
 
 def _called(ev: Evaluator) -> Procedure | None:
@@ -144,10 +176,26 @@ def no_table(ev: Evaluator, target: Target, step: int, container: object, instr:
     if container is ABSENT:
         close = nearest(target.name, list(ev.session.names()))
         hint = "did you mean {close}?" if close else "make the table first: {name} = TABL ;"
-        return GibianeError(make(315, "{name} is not defined: it has no elements to assign", name=target.name,
-                                 span=span, close=close, hint=hint))
-    return GibianeError(make(315, "{name} is a {type}, not a TABLE: it has no elements to assign", name=span.text,
-                             type=type_of(container), span=span, hint="make the table first: {name} = TABL ;"))
+        return GibianeError(
+            make(
+                315,
+                "{name} is not defined: it has no elements to assign",
+                name=target.name,
+                span=span,
+                close=close,
+                hint=hint,
+            )
+        )
+    return GibianeError(
+        make(
+            315,
+            "{name} is a {type}, not a TABLE: it has no elements to assign",
+            name=span.text,
+            type=type_of(container),
+            span=span,
+            hint="make the table first: {name} = TABL ;",
+        )
+    )
 
 
 # -- warnings of a session at the prompt --------------------------------------------------------------------------
@@ -158,21 +206,41 @@ def warn_lonely_word(ev: Evaluator, q: Operands) -> None:
     node = q.nodes[0]
     if not isinstance(node, Name) or q.values[0] != node.word:
         return
-    missing = cast3m.lacks(node.word)
+    missing = cast3m.meant(node.word)
     if missing is not None:
-        raise not_available(*missing, q, node)
+        raise GibianeError(q.not_available(0, *missing))
     close = nearest(node.word, [*spellings(), *ev.session.names(), *ev.session.library.names()])
-    ev.session.emit(make("G301", "the word {word} does nothing: no object or operator has this name", word=node.word,
-                         span=q.span(node), close=close, hint="did you mean {close}?" if close else None))
+    ev.session.emit(
+        make(
+            "G301",
+            "the word {word} does nothing: no object or operator has this name",
+            word=node.word,
+            span=q.span(node),
+            close=close,
+            hint="did you mean {close}?" if close else None,
+        )
+    )
 
 
-def warn_hidden_operator(ev: Evaluator, target: Target, instr: Instr) -> None:
-    """Warn of a name that hides an operator from now on."""
-    op = find(target.name)
-    if op is not None and len(target.name) >= min(4, len(op.name)):
-        ev.session.emit(make("G301", "the name {name} now hides the operator {operator}", name=target.name,
-                             operator=op.name, span=instr.at(target), short=op.name[:4],
-                             hint="quote the operator to call it all the same: '{short}'"))
+def warn_hidden_operators(ev: Evaluator, program: list[Instr]) -> None:
+    """Warn of names that a text gives a value and that hide an operator from then on."""
+    known = set(ev.session.names())
+    for instr in program:
+        for target in instr.targets:
+            op = find(target.name) if not target.path and not target.member and target.name not in known else None
+            if op is not None and target.name in (op.name, op.name[:4]):
+                known.add(target.name)
+                ev.session.emit(
+                    make(
+                        "G301",
+                        "the name {name} now hides the operator {hidden}",
+                        name=target.name,
+                        hidden=op.name,
+                        span=instr.at(target),
+                        short=op.name[:4],
+                        hint="quote the operator to call it all the same: '{short}'",
+                    )
+                )
 
 
 def warn_traps(ev: Evaluator, op: Operator, q: Operands, at: int) -> None:
@@ -182,12 +250,26 @@ def warn_traps(ev: Evaluator, op: Operator, q: Operands, at: int) -> None:
         numbers = (int, float)
         if at >= 2 and at + 1 < len(q.values) and all(type(q.values[i]) in numbers for i in (0, 1, at - 1, at + 1)):
             used = [Label(q.span(q.nodes[i]), Text("read")) for i in (0, 1)]
-            ev.session.emit(make("G301", "{operator} reads the two leftmost numbers, not those beside it",
-                                 operator=op.name, span=q.span(node), labels=used,
-                                 hint="put the operation between parentheses"))
+            ev.session.emit(
+                make(
+                    "G301",
+                    "{symbol} reads the two leftmost numbers, not those beside it",
+                    symbol=op.name,
+                    span=q.span(node),
+                    labels=used,
+                    hint="put the operation between parentheses",
+                )
+            )
     elif isinstance(node, Name) and q.values[at] == node.word:
         word = node.word
         if len(word) > 4 and not op.name.startswith(word) and not word[4:].isalpha():
-            ev.session.emit(make("G301", "the word {word} runs the operator {operator}: four letters are enough",
-                                 word=word, operator=op.name, span=q.span(node),
-                                 hint="an object of this name must be given a value first"))
+            ev.session.emit(
+                make(
+                    "G301",
+                    "the word {word} runs the operator {hidden}: four letters are enough",
+                    word=word,
+                    hidden=op.name,
+                    span=q.span(node),
+                    hint="an object of this name must be given a value first",
+                )
+            )

@@ -41,7 +41,7 @@ def notice(ctx: Context, word: str, node: Any) -> str:
     if op is not None:
         return describe(op)
     ctx.places["word"] = node
-    missing = cast3m.lacks(word)
+    missing = cast3m.meant(word)
     if missing is not None:
         name, near = missing
         ctx.fail(251, "{name} of Cast3M is not available yet", at="word", name=name, near=near,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
-from gibiane import registry, slips
+from gibiane import faults, registry, slips
 from gibiane.blocks import annotate
 from gibiane.diagnostics import ERROR, Diagnostic, GibianeError, error, make, render
 from gibiane.evaluator import Evaluator
@@ -191,6 +191,8 @@ class Session:
             self.library.directory = source.directory
         limit = sys.getrecursionlimit()
         sys.setrecursionlimit(max(limit, RECURSION_LIMIT))
+        if self.options["WARN"]:
+            faults.warn_hidden_operators(self.evaluator, program)
         try:
             self.evaluator.run(program)
         except Stop:
