@@ -36,6 +36,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "ENVELOPPE": ("gibiane_ops.mesh.volumes",),
     "POINT": ("gibiane_ops.mesh.selection", "gibiane_ops.fields.places"),
     "NBEL": ("gibiane_ops.mesh.selection",),
+    "INDI": ("gibiane_ops.mesh.quality",),
     "NOEUD": ("gibiane_ops.mesh.selection",),
     "NBNO": ("gibiane_ops.mesh.selection",),
     "COULEUR": ("gibiane_ops.mesh.selection",),

@@ -20,6 +20,7 @@ from gibiane_ops.kernels.mesh import (
     locate,
     orientation,
     project,
+    quality,
     simplices,
     subdivision,
     sweep,
@@ -376,3 +377,30 @@ def test_contours_and_sharp_edges_of_a_box():
     ].sum() / 2 == pytest.approx(4)
     three = np.array([[0, 1, 4, 3], [0, 1, 10, 9], [0, 1, 5, 6]])
     assert np.sort(edges.contour([("QUA4", three)], "INTE")).tolist() == [[0, 1]]
+
+
+# ---------------------------------------------------------------- quality
+
+
+def test_quality_of_equilateral_right_and_flat_elements():
+    triangle = np.array([[0, 0], [1, 0], [0.5, math.sqrt(0.75)]])
+    tetrahedron = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]], float)
+    for regular in (triangle, tetrahedron):
+        X = 3.0 * regular[None]
+        assert quality.mean_ratio(X) == pytest.approx([1])
+        assert quality.aspect(X) == pytest.approx([1])
+        assert quality.skewness(X) == pytest.approx([0], abs=1e-12)
+        flat = X.copy()
+        flat[:, -1] = flat[:, :-1].mean(axis=1)
+        assert quality.mean_ratio(flat) == pytest.approx([0], abs=1e-6)
+        assert quality.skewness(flat) == pytest.approx([1], abs=1e-6)
+    # Right isosceles triangle of legs 1: area 1/2, squares 1 + 1 + 2, height 1/sqrt 2, radius 1/sqrt 2.
+    right = np.array([[[0, 0], [1, 0], [0, 1]]], float)
+    assert quality.mean_ratio(right) == pytest.approx([math.sqrt(3) / 2])
+    assert quality.aspect(right) == pytest.approx([math.sqrt(3)])
+    assert quality.skewness(right) == pytest.approx([1 - 0.5 / (3 * math.sqrt(3) / 8)])
+    # Corner of a cube: volume 1/6, squares 3 + 6, largest face sqrt 3 / 2, radius sqrt 3 / 2.
+    corner = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]], float)
+    assert quality.mean_ratio(corner) == pytest.approx([12 * 0.5 ** (2 / 3) / 9])
+    assert quality.aspect(corner) == pytest.approx([math.sqrt(2 / 3) * math.sqrt(2) * math.sqrt(3)])
+    assert quality.skewness(corner) == pytest.approx([1 - (1 / 6) / (8 * math.sqrt(3) / 27 * (math.sqrt(3) / 2) ** 3)])
