@@ -33,7 +33,7 @@ venv: $(VENV)/installed
 venv-dev: $(VENV)/installed-dev
 
 demo: venv
-	$(BIN)/gibiane $(DEMO)/scene.dgibi
+	cd $(DEMO) && $(abspath $(BIN))/gibiane scene.dgibi
 	@echo
 	@echo "Pictures and files of this run: $(DEMO)/results"
 	@ls $(DEMO)/results
