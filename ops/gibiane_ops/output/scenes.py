@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from gibiane_ops.kernels.plot.layers import (
     amplification,
     lifts,
     outline,
+    placed,
+    used,
 )
 from gibiane_ops.kernels.plot.skin import skin
 from gibiane_ops.kernels.recovery import nodal_mean
@@ -232,3 +234,43 @@ def arrow_layers(points: FloatArray, vectors: Vecteur, size: float) -> list[Laye
 def diagonal(points: FloatArray, nodes: IntArray) -> float:
     """Return the diagonal of the box of some points, 1 when it is a point."""
     return float(np.linalg.norm(np.ptp(points[nodes], axis=0))) or 1.0 if len(nodes) else 1.0
+
+
+def spread(parts: list[list[Layer]], look: Look) -> list[Layer]:
+    """Return the layers of several objects in one list, the objects moved apart if the look asks for it."""
+    parts = [part for part in parts if part]
+    if look.apart is None or len(parts) < 2:
+        return [layer for part in parts for layer in part]
+    shifts = lifts([np.concatenate([placed(each)[used(each)] for each in part]) for part in parts], look.apart)
+    return [replace(each, offset=shift) for part, shift in zip(parts, shifts, strict=True) for each in part]
+
+
+def element_layers(
+    shown: MChaml, points: FloatArray, look: Look, component: str | None, zones: list[ModelZone] | None
+) -> list[Layer]:
+    """Return the layers of a component of an element field, on some zones or all."""
+    parts: list[list[Layer]] = []
+    for zone in shown.zones:
+        if not isinstance(zone.zone, ModelZone) or (zones is not None and zone.zone not in zones):
+            continue
+        if component is not None and component in zone.names:
+            values = of_zone(shown, zone.zone, zone.component(component), len(points))
+            parts.append(cells_layers(points, [(zone.zone.shape, zone.zone.cells)], look, values))
+    return spread(parts, look)
+
+
+def field_layers(
+    shown: ChPoint | MChaml, mesh: Maillage, points: FloatArray, look: Look, component: str | None
+) -> list[Layer]:
+    """Return the layers of a component of a field shown on a displaced mesh."""
+    if isinstance(shown, MChaml):
+        return element_layers(shown, points, look, component, None)
+    values = of_chpoint(shown, component) if component is not None else None
+    return mesh_layers(points, mesh, look, values=values)
+
+
+def of_colour(mesh: Maillage, word: str) -> Maillage:
+    """Return the elements of one colour."""
+    index = COLOUR_NAMES.index(word)
+    chosen = [(b, b.colours == index) for b in mesh.blocks]
+    return Maillage(mesh.store, [Block(b.shape, b.cells[k], b.colours[k]) for b, k in chosen])

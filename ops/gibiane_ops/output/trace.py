@@ -254,7 +254,7 @@ def _layers(r: _Request, points: FloatArray, look: Look, component: str | None) 
                 caption = f"displacements x {factor:g}"
             alone = r.element is None and r.nodal is None
             if item.field is not None and alone:
-                layers += _on_cells(item.field, item.mesh, moved, look, component)
+                layers += scenes.field_layers(item.field, item.mesh, moved, look, component)
             elif (len(r.shapes.shapes) > 1 and factor == 0.0) or not alone:
                 layers += scenes.outline_layers(moved, item.mesh, item.colour)
             else:
@@ -263,48 +263,18 @@ def _layers(r: _Request, points: FloatArray, look: Look, component: str | None) 
                 layers += scenes.arrow_layers(moved, item.arrows, scenes.diagonal(points, item.mesh.nodes))
     if r.element is not None:
         zones = None if r.model is None else r.model.zones
-        layers += _element_layers(r.element[0], base, look, component, zones)
+        layers += scenes.element_layers(r.element[0], base, look, component, zones)
+    parts: list[list[Layer]] = []
     for number, (mesh, name) in enumerate(r.meshes):
         label = name if "QUAL" in r.words else ""
         if r.colour:
-            mesh = _of_colour(mesh, r.colour)
+            mesh = scenes.of_colour(mesh, r.colour)
         if r.nodal is not None and component is not None:
             values = scenes.of_chpoint(r.nodal[0], component)
-            layers += scenes.mesh_layers(base, mesh, look, values=values, label=label)
+            parts.append(scenes.mesh_layers(base, mesh, look, values=values, label=label))
         elif r.element is not None or "ARET" in r.words:
             layers += scenes.outline_layers(points, mesh)
         else:
-            layers += scenes.mesh_layers(base, mesh, look, label=label, first=number)
+            parts.append(scenes.mesh_layers(base, mesh, look, label=label, first=number))
             caption = caption or f"{sum(m.n_cells for m, _ in r.meshes)} elements"
-    return layers, caption
-
-
-def _of_colour(mesh: Maillage, word: str) -> Maillage:
-    from gibiane_ops.values.maillage import COLOURS, Block
-
-    index = COLOURS.index(word)
-    chosen = [(b, b.colours == index) for b in mesh.blocks]
-    return Maillage(mesh.store, [Block(b.shape, b.cells[k], b.colours[k]) for b, k in chosen])
-
-
-def _on_cells(
-    shown: ChPoint | MChaml, mesh: Maillage, points: FloatArray, look: Look, component: str | None
-) -> list[Layer]:
-    if isinstance(shown, ChPoint):
-        values = scenes.of_chpoint(shown, component) if component is not None else None
-        return scenes.mesh_layers(points, mesh, look, values=values)
-    return _element_layers(shown, points, look, component, None)
-
-
-def _element_layers(
-    shown: MChaml, points: FloatArray, look: Look, component: str | None, zones: list[ModelZone] | None
-) -> list[Layer]:
-    layers: list[Layer] = []
-    for zone in shown.zones:
-        if not isinstance(zone.zone, ModelZone) or (zones is not None and zone.zone not in zones):
-            continue
-        if component is None or component not in zone.names:
-            continue
-        values = scenes.of_zone(shown, zone.zone, zone.component(component), len(points))
-        layers += scenes.cells_layers(points, [(zone.zone.shape, zone.zone.cells)], look, values)
-    return layers
+    return layers + scenes.spread(parts, look), caption
