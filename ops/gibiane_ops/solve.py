@@ -6,21 +6,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, RIGIDITE, TABLE, Table
-
 from gibiane_ops.kernels import errors as k_errors
-from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import Condensation, condense
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.pairs import facets_of_body
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.contact.status import solve_statuses
-from gibiane_ops.kernels.rigid import FreeMotion, free_motions
-from gibiane_ops.kernels.solve import Factor, factorize
 from gibiane_ops.values.champs import DISCRET, ChPoint
 from gibiane_ops.values.failures import worded
+from gibiane_ops.values.linear import check_held, kept, reduced, solve_linear, tell_notes
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.rapport import fill_report
 from gibiane_ops.values.rigidite import Rigidite
@@ -30,14 +28,17 @@ RESO = operator(
     "RESO",
     topic="resolution",
     summary="solve a linear system with its conditions, and contact with friction",
-    notice="`U = RESO K F`: K joins stiffness, conditions (BLOQ, SYMT) and contact conditions (RIGI of a contact model) by "
-    "ET; F joins loads, imposed values (DEPI) and gaps. Several second members give several solutions with one "
-    "factorisation. With contact the default is 'NEWT', the exact solution by a semi-smooth Newton method on the "
+    notice="`U = RESO K F`: K joins stiffness, conditions (BLOQ, SYMT, RELA) and contact conditions (RIGI of a contact "
+    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members, and further calls with the "
+    "same matrices, share one factorisation. A single solution of a large solid comes from conjugate gradients with "
+    "algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into the "
+    "memory; OPTI 'RESO' 'DIRE' or 'ITER' chooses instead, OPTI 'ECHO' 1 tells. With contact the default is 'NEWT', the exact solution by a semi-smooth Newton method on the "
     "unknowns of the interface; 'STATUT' is the fixed point of statuses of Becheur, Tahakourt and Coorevits 2008, "
     "which holds no node inside the cone and keeps an error of its own. 'RAPP' T fills a table: CONVERGE, "
     "ITERATIONS, STATUTS (open, stick, slip), PENETRATION, CONE, PUISSANCE, HISTOIRE. 'DEPA' U starts from another "
     "solution. 'SOUC' turns a failure to converge into a warning and gives the best iterate. 'NOID' ignores the "
-    "part of the load that the matrix does not know. LX holds the multipliers of the conditions, on nodes of their own.",
+    "part of the load that the matrix does not know. LX holds the multipliers of the conditions, on nodes of their "
+    "own.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
     "CL = BLOQ 'DEPL' (S POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"
@@ -53,6 +54,7 @@ METHODS = ("NEWT", "STATUT")
 @RESO.form(
     Arg("k", RIGIDITE, "stiffness and conditions"),
     Arg("f", CHPOINT, "second members", many=True),
+    Arg("prec", FLOTTANT, "relative residual of iterations", optional=True),
     Key(METHODS, "contact method", name="method"),
     Key("RAPP", "report to fill", Arg("t", TABLE)),
     Key("DEPA", "start of the contact iterations", Arg("u", CHPOINT)),
@@ -65,6 +67,7 @@ def _reso(
     ctx: Context,
     k: Rigidite,
     f: list[ChPoint],
+    prec: float | None,
     method: str | None,
     rapp: Table | None,
     depa: ChPoint | None,
@@ -81,7 +84,7 @@ def _reso(
             for field, load in zip(f, loads, strict=True)
         ]
     else:
-        results = _linear(ctx, k, system, loads)
+        results = solve_linear(ctx, k, system, loads, prec)
     return tuple(results)
 
 
@@ -90,85 +93,11 @@ def _check_sense(ctx: Context, system: System) -> None:
         if part.sense != "=":
             ctx.fail(
                 251,
-                "{label}: conditions with MINI or MAXI are not available yet",
+                "{which}: conditions with MINI or MAXI are not available yet",
                 at="k",
-                label=part.label,
+                which=part.origin,
                 hint="contact between surfaces is: MODE G1 G2 'CONTACT'",
             )
-
-
-def _kept(ctx: Context, kind: str, k: Rigidite, extra: Any, make: Any) -> Any:
-    """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
-
-    One result of each kind is kept: a factor of a large model fills most of the memory.
-    """
-    cache: dict[str, Any] = ctx.state.setdefault("factors", {})
-    parts = [*k.matrices, *k.conditions]
-    key = (node_store(ctx).version, extra, *(id(part) for part in parts))
-    found = cache.get(kind)
-    if found is None or found[0] != key:
-        cache.clear()
-        found = cache[kind] = key, parts, make()  # the parts stay alive, so that their ids are not used again
-    return found[2]
-
-
-def _linear(ctx: Context, k: Rigidite, system: System, loads: list[tuple[FloatArray, FloatArray]]) -> list[ChPoint]:
-    F = np.column_stack([force for force, _ in loads])
-    imposed = np.column_stack([values for _, values in loads])
-    with worded(ctx, at="k"):
-        reduction = reduce_conditions(system.C, imposed)
-
-    def factor() -> Factor:
-        _check_held(ctx, system)
-        try:
-            return factorize(reduction.matrix(system.K))
-        except k_errors.SingularSystem as failure:
-            ctx.fail(
-                49,
-                "the system is singular: {reason}",
-                at="k",
-                reason=str(failure),
-                hint="is every solid held, and every element sound?",
-            )
-
-    solver: Factor = _kept(ctx, "factor", k, None, factor)
-    v = solver.solve(reduction.load(system.K, F))
-    _notes(ctx, solver)
-    u = reduction.expand(v)
-    m = reduction.multipliers(reduction.reactions(system.K, u, F))
-    return [system.field(u[:, i], m[:, i]) for i in range(u.shape[1])]
-
-
-def _notes(ctx: Context, solver: Factor) -> None:
-    for note in solver.notes:
-        ctx.warn("G201", "{note}", note=note)
-
-
-def _check_held(ctx: Context, system: System, contact_rows: Any = None) -> None:
-    """Fail with G404 when a solid can move as a rigid body, naming the motion."""
-    import scipy.sparse as sp
-
-    C = system.C if contact_rows is None else sp.vstack([system.C, contact_rows])
-    if system.dim != len(system.names) or system.names[0] not in ("UX",):
-        return
-    motions = free_motions(system.K, system.points, C)
-    if motions:
-        shown = "; ".join(_motion(m) for m in motions[:3]) + ("; ..." if len(motions) > 3 else "")
-        ctx.fail(
-            "G404",
-            "nothing stops {count} rigid motions: {motions}",
-            at="k",
-            count=len(motions),
-            motions=shown,
-            hint="hold the solid with BLOQ or SYMT, or join its contact conditions to the matrix",
-        )
-
-
-def _motion(motion: FreeMotion) -> str:
-    """Name a free motion and the solid that makes it, counted from 1."""
-    who = " and ".join(f"solid {i + 1}" for i in motion.solids)
-    centre = ", ".join(f"{x:g}" for x in motion.centre)
-    return f"{who}, centred at ({centre}): {motion.movement}"
 
 
 def _contact(
@@ -197,22 +126,21 @@ def _contact(
             depth=f"{-pairs.gap[worst]:.3g}",
             hint="move one solid, or give the gap: MATE MC 'JEU' 0.",
         )
-    with worded(ctx, at="k"):
-        reduction = reduce_conditions(system.C, imposed)
+    reduction = reduced(ctx, system, imposed)
 
     def condensed() -> Condensation:
-        _check_held(ctx, system, _tied_rows(system, pairs.pairs))
+        check_held(ctx, system, _tied_rows(system, pairs.pairs))
         try:
             return condense(system.K, pairs, reduction)
         except k_errors.SingularSystem as failure:
             ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
 
     with worded(ctx, at="k"):
-        condensation: Condensation = _kept(
+        condensation: Condensation = kept(
             ctx, "contact", k, (pairs.pairs.tobytes(), pairs.normals.tobytes()), condensed
         )
         interface = _with_gap(condensation, pairs.gap).interface(F, reduction.offset)
-    _notes(ctx, condensation.factor)
+    tell_notes(ctx, condensation.factor)
     options = {} if tolerance is None else {"tolerance": tolerance}
     mu = system.friction()
     state: ContactState
@@ -351,5 +279,8 @@ def _reac(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
     parts = {}
     for name, pieces in terms.items():
         nodes, inverse = np.unique(np.concatenate([n for n, _ in pieces]), return_inverse=True)
-        parts[name] = (nodes, np.bincount(inverse, np.concatenate([f for _, f in pieces]), minlength=len(nodes)))
+        parts[name] = (
+            nodes,
+            np.asarray(np.bincount(inverse, np.concatenate([f for _, f in pieces]), minlength=len(nodes)), np.float64),
+        )
     return ChPoint(store, parts, DISCRET)

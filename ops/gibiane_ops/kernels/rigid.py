@@ -193,13 +193,11 @@ def _solids(K: sp.csr_array, n: int, dim: int) -> IntArray:
     """Return the solid of each node, -1 where there is no stiffness."""
     from scipy.sparse.csgraph import connected_components
 
-    n_labels, label = connected_components(K, directed=False)
-    # The components of one node belong together even where the matrix does not couple them.
-    same = label.reshape(n, dim)
-    first, others = np.repeat(same[:, 0], dim - 1), same[:, 1:].ravel()
-    links = sp.csr_array((np.ones(len(first)), (first, others)), shape=(n_labels, n_labels))
-    _, joined = connected_components(links, directed=False)
-    of_node = joined[same[:, 0]]
+    # The graph of the nodes: the components of one node belong together even where the matrix does not couple them.
+    blocks = K.tobsr(blocksize=(dim, dim))
+    graph = sp.csr_array((np.ones(len(blocks.indices)), blocks.indices, blocks.indptr), shape=(n, n))
+    # In a symmetric graph strong components are the components, found without its transpose.
+    _, of_node = connected_components(graph, directed=True, connection="strong")
     stiff = (K.diagonal().reshape(n, dim) != 0).any(axis=1)
     solid = np.full(n, -1, np.int64)
     names, first_node, number = np.unique(of_node[stiff], return_index=True, return_inverse=True)

@@ -6,17 +6,13 @@ package takes over and a note says so. A singular matrix is recognised by its ow
 
 from __future__ import annotations
 
-import importlib.util
-import warnings
-from collections.abc import Callable
-
 import numpy as np
 import scipy.sparse as sp
 
+from gibiane_ops.kernels import packages
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.errors import BadValue, MissingPackage, SingularSystem
-
-Solve = Callable[[FloatArray], FloatArray]
+from gibiane_ops.kernels.packages import DIRECT, MODULES, Iteration, Solve, is_installed
 
 RESIDUAL_LIMIT = 1e-9
 """Largest accepted norm of ``A x - b`` over that of ``b`` (largest entry, column by column)."""
@@ -30,9 +26,6 @@ SUPERLU_LIMIT = 30_000
 SAMPLED_COLUMNS = 4
 """Number of right-hand sides above which one random combination of them is checked."""
 
-DIRECT = ("rslab", "pardiso", "superlu")
-_MODULES = {"rslab": "rslab", "pardiso": "pypardiso", "superlu": "scipy", "amg": "pyamg"}
-
 
 class Factor:
     """A factorised matrix that solves, checks its answer, and changes package when the answer is bad.
@@ -40,17 +33,22 @@ class Factor:
     Attributes
     ----------
     name : str
-        Package in use: ``rslab``, ``pardiso``, ``superlu`` or ``amg``.
+        Package in use: ``rslab``, ``pardiso``, ``superlu``, ``amg`` or ``cg``.
     residual : float
         Largest relative residual met so far.
     notes : tuple of str
         What the user should know: a slow package, a package that failed.
     """
 
-    def __init__(self, A: sp.csr_array, packages: tuple[str, ...], near_null: FloatArray | None) -> None:
+    def __init__(
+        self, A: sp.csr_array, names: tuple[str, ...], near_null: FloatArray | None, block: int, tolerance: float
+    ) -> None:
         self._A = A
-        self._packages = list(packages)
+        self._packages = list(names)
         self._near_null = near_null
+        self._block = block
+        self._tolerance = tolerance
+        self._limit = max(RESIDUAL_LIMIT, 10 * tolerance)
         self._notes: list[str] = []
         self._scale = _diagonal_scale(A)
         self.name = ""
@@ -63,6 +61,11 @@ class Factor:
     def notes(self) -> tuple[str, ...]:
         """What the user should know about this factorisation."""
         return tuple(self._notes)
+
+    @property
+    def iterations(self) -> int:
+        """Iterations of the last solve, 0 for a factorisation."""
+        return self._solve.iterations if isinstance(self._solve, Iteration) else 0
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -118,12 +121,12 @@ class Factor:
             size = np.abs(b).max(axis=0)
             weights = np.random.default_rng(0).standard_normal(len(size)) / np.where(size > 0, size, 1.0)
             relative = float(np.abs(self._A @ (x @ weights) - b @ weights).max())
-            if relative <= RESIDUAL_LIMIT:
+            if relative <= self._limit:
                 return relative, True
         r = np.abs(self._A @ x - b).max(axis=0)
         size = np.abs(b).max(axis=0)
         relative = float(np.divide(r, size, out=np.zeros_like(r), where=size > 0).max())
-        good = r <= RESIDUAL_LIMIT * size
+        good = r <= self._limit * size
         if not good.all():
             floor = np.abs(self._A) @ np.abs(x) + np.abs(b)
             weight = 1 / self._scale**2
@@ -140,7 +143,7 @@ class Factor:
                 self._notes.append(f"{self.name}: factorisation failed ({error})")
                 self._raise_if_singular(shifted=True)
                 continue
-            if self.name != "amg":
+            if self.name in DIRECT:
                 self._raise_if_singular(shifted=False)
             n = self._A.shape[0]
             if self.name == "superlu" and n > SUPERLU_LIMIT:
@@ -169,16 +172,26 @@ class Factor:
     def _factorize(self, A: sp.csr_array) -> Solve:
         match self.name:
             case "rslab":
-                return _rslab(A)
+                return packages.rslab(A)
             case "pardiso":
-                return _pardiso(A)
+                return packages.pardiso(A)
             case "superlu":
-                return _superlu(A)
+                return packages.superlu(A)
+            case "amg":
+                return packages.amg(A, self._near_null, self._block, self._tolerance)
             case _:
-                return _amg(A, self._near_null)
+                return packages.cg(A, self._block, self._tolerance)
 
 
-def factorize(A: sp.sparray | sp.spmatrix, *, method: str = "auto", near_null: FloatArray | None = None) -> Factor:
+def factorize(
+    A: sp.sparray | sp.spmatrix,
+    *,
+    method: str = "auto",
+    near_null: FloatArray | None = None,
+    block: int = 1,
+    tolerance: float = 1e-10,
+    reserve: bool = True,
+) -> Factor:
     """Factorise a symmetric positive definite sparse matrix.
 
     Parameters
@@ -187,9 +200,15 @@ def factorize(A: sp.sparray | sp.spmatrix, *, method: str = "auto", near_null: F
     method : str
         ``auto`` takes the first installed direct package among rslab, pardiso (pypardiso), superlu (SciPy) and keeps
         the others in reserve. The name of a package takes that one only. ``amg`` takes conjugate gradients with an
-        algebraic multigrid preconditioner (pyamg), direct packages in reserve.
+        algebraic multigrid preconditioner (pyamg), ``cg`` with the diagonal blocks; direct packages in reserve.
     near_null : (n, k) float64, optional
         Rigid-body modes, used by ``amg`` only; for 3D elasticity without them it converges slowly.
+    block : int
+        Unknowns per node, used by ``amg`` and ``cg``; n is a multiple of it.
+    tolerance : float
+        Relative residual where iterations stop.
+    reserve : bool
+        Whether direct packages may take over from iterations that fail.
 
     Returns
     -------
@@ -213,24 +232,21 @@ def factorize(A: sp.sparray | sp.spmatrix, *, method: str = "auto", near_null: F
     ----
     On 3D elasticity with n unknowns, about n^2 operations and n^(4/3) memory; ``amg`` is linear in both.
     """
-    A = sp.csr_array(A, dtype=np.float64)
+    if A.format != "bsr" or A.dtype != np.float64:
+        A = sp.csr_array(A, dtype=np.float64)
     if not np.isfinite(A.data).all():
         raise BadValue("matrix entry", float(A.data[~np.isfinite(A.data)][0]), "a finite value")
     if method == "auto":
-        packages = tuple(name for name in DIRECT if _is_installed(name))
-    elif method not in _MODULES:
-        raise BadValue("method", method, "one of auto, " + ", ".join(_MODULES))
-    elif not _is_installed(method):
-        raise MissingPackage(_MODULES[method], f"pip install {_MODULES[method]}")
-    elif method == "amg":
-        packages = ("amg", *(name for name in DIRECT if _is_installed(name)))
+        names = tuple(name for name in DIRECT if is_installed(name))
+    elif method not in MODULES:
+        raise BadValue("method", method, "one of auto, " + ", ".join(MODULES))
+    elif not is_installed(method):
+        raise MissingPackage(MODULES[method], f"pip install {MODULES[method]}")
+    elif method in ("amg", "cg"):
+        names = (method, *(name for name in DIRECT if reserve and is_installed(name)))
     else:
-        packages = (method,)
-    return Factor(A, packages, near_null)
-
-
-def _is_installed(name: str) -> bool:
-    return importlib.util.find_spec(_MODULES[name]) is not None
+        names = (method,)
+    return Factor(A, names, near_null, block, tolerance)
 
 
 def _diagonal_scale(A: sp.csr_array) -> FloatArray:
@@ -240,54 +256,3 @@ def _diagonal_scale(A: sp.csr_array) -> FloatArray:
     if len(bad):
         raise SingularSystem("unknowns without stiffness", unknowns=bad)
     return np.asarray(1 / np.sqrt(diagonal))
-
-
-def _rslab(A: sp.csr_array) -> Solve:
-    import rslab
-
-    factor = rslab.ldlt(A.tocsc())
-
-    def solve(b: FloatArray) -> FloatArray:
-        return np.asarray(factor.solve(b) if b.ndim == 1 else factor.solve_many(np.ascontiguousarray(b)))
-
-    return solve
-
-
-def _pardiso(A: sp.csr_array) -> Solve:
-    from pypardiso import PyPardisoSolver
-    from pypardiso.pardiso_wrapper import PyPardisoError
-
-    solver = PyPardisoSolver(mtype=2)  # symmetric positive definite, upper triangle
-    upper = sp.triu(A, format="csr")
-    try:
-        solver.factorize(upper)
-    except PyPardisoError as error:
-        raise RuntimeError(str(error)) from error
-    return lambda b: np.asarray(solver.solve(upper, np.asfortranarray(b))).reshape(b.shape)
-
-
-def _superlu(A: sp.csr_array) -> Solve:
-    from scipy.sparse.linalg import splu
-
-    options = {"SymmetricMode": True}
-    factor = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    return lambda b: np.asarray(factor.solve(b))
-
-
-def _amg(A: sp.csr_array, near_null: FloatArray | None) -> Solve:
-    import pyamg
-
-    smoother = ("block_gauss_seidel" if near_null is not None else "gauss_seidel", {"sweep": "symmetric"})
-    hierarchy = pyamg.smoothed_aggregation_solver(
-        A, B=near_null, symmetry="symmetric", strength=("symmetric", {"theta": 0.0}),
-        presmoother=smoother, postsmoother=smoother, max_coarse=500,
-    )  # fmt: skip
-
-    def solve(b: FloatArray) -> FloatArray:
-        columns = b.reshape(len(b), -1)
-        # pyamg warns when it breaks down on a singular matrix: the residual check of Factor finds that out
-        with warnings.catch_warnings(record=True), np.errstate(all="ignore"):
-            found = [hierarchy.solve(column, tol=1e-11, accel="cg", maxiter=200) for column in columns.T]
-        return np.stack(found, axis=1).reshape(b.shape)
-
-    return solve

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import solve
+from gibiane_ops.kernels import packages, solve
 from gibiane_ops.kernels.errors import BadValue, SingularSystem
 from gibiane_ops.kernels.solve import factorize
 
@@ -25,7 +25,7 @@ def laplacian3(n):
     return sp.csr_matrix(sp.kron(plane, eye) + sp.kron(sp.identity(n * n), one))
 
 
-@pytest.mark.parametrize("method", ["auto", "rslab", "superlu", "amg"])
+@pytest.mark.parametrize("method", ["auto", "rslab", "superlu", "amg", "cg"])
 @pytest.mark.parametrize("shape", [(343,), (343, 1), (343, 70)])
 def test_solves_one_and_several_right_hand_sides(method, shape):
     A = laplacian3(7)
@@ -76,7 +76,7 @@ def test_stiff_but_regular_system_is_accepted():
 
 
 def test_a_wrong_package_is_replaced(monkeypatch):
-    monkeypatch.setattr(solve, "_rslab", lambda A: lambda b: 2 * b)
+    monkeypatch.setattr(packages, "rslab", lambda A: lambda b: 2 * b)
     factor = factorize(chain(20))
     x = factor.solve(np.ones(20))
     np.testing.assert_allclose(chain(20) @ x, 1, rtol=1e-12)
@@ -85,8 +85,8 @@ def test_a_wrong_package_is_replaced(monkeypatch):
 
 
 def test_a_slightly_wrong_package_is_refined(monkeypatch):
-    good = solve._superlu
-    monkeypatch.setattr(solve, "_rslab", lambda A: lambda b: (1 + 1e-6) * good(A)(b))
+    good = packages.superlu
+    monkeypatch.setattr(packages, "rslab", lambda A: lambda b: (1 + 1e-6) * good(A)(b))
     factor = factorize(chain(20))
     np.testing.assert_allclose(chain(20) @ factor.solve(np.ones(20)), 1, rtol=1e-11)
     assert factor.name == "rslab"
@@ -95,7 +95,7 @@ def test_a_slightly_wrong_package_is_refined(monkeypatch):
 
 @pytest.mark.parametrize("column", [0, 17, 39])
 def test_one_wrong_column_among_many_is_found(monkeypatch, column):
-    good = solve._superlu
+    good = packages.superlu
 
     def slips(A):
         def wrong(b):
@@ -106,7 +106,7 @@ def test_one_wrong_column_among_many_is_found(monkeypatch, column):
 
         return wrong
 
-    monkeypatch.setattr(solve, "_rslab", slips)
+    monkeypatch.setattr(packages, "rslab", slips)
     factor = factorize(chain(20))
     b = np.random.default_rng(2).standard_normal((20, 40)) * 10.0 ** np.arange(-20, 20)
     x = factor.solve(b)
@@ -118,16 +118,16 @@ def test_a_failing_package_is_replaced(monkeypatch):
     def fails(A):
         if A[0, 0] == 2.0:
             raise RuntimeError("zero pivot")
-        return solve._superlu(A)
+        return packages.superlu(A)
 
-    monkeypatch.setattr(solve, "_rslab", fails)
+    monkeypatch.setattr(packages, "rslab", fails)
     factor = factorize(chain(20))
     assert factor.name == "superlu"
     assert "zero pivot" in factor.notes[0]
 
 
 def test_no_package_left(monkeypatch):
-    monkeypatch.setattr(solve, "_superlu", lambda A: lambda b: 2 * b)
+    monkeypatch.setattr(packages, "superlu", lambda A: lambda b: 2 * b)
     with pytest.raises(SingularSystem, match="superlu"):
         factorize(chain(20), method="superlu").solve(np.ones(20))
 

@@ -1,0 +1,249 @@
+"""Linear solutions of a system: contradictions and free motions named, a solver chosen, its answer checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+import scipy.sparse as sp
+
+from gibiane.registry import Context
+from gibiane_ops.kernels import errors as k_errors
+from gibiane_ops.kernels.choice import Choice, choose
+from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
+from gibiane_ops.kernels.packages import DIRECT, is_installed
+from gibiane_ops.kernels.rigid import FreeMotion, free_motions, rigid_modes
+from gibiane_ops.kernels.solve import Factor, factorize
+from gibiane_ops.values.champs import ChPoint
+from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.system import System
+
+ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
+ENERGY_LIMIT = 1e-6
+"""Share of the energy that may be missing in ``u.K.u = u.(F + r)`` before a warning is due."""
+
+METHODS = {
+    "rslab": "sparse LDLt (rslab)",
+    "pardiso": "sparse Cholesky (PARDISO)",
+    "superlu": "sparse LU (SuperLU)",
+    "amg": "conjugate gradients with algebraic multigrid (pyamg)",
+    "cg": "conjugate gradients with block diagonal preconditioner",
+}
+
+
+def kept(ctx: Context, kind: str, k: Rigidite, extra: Any, make: Callable[[], Any]) -> Any:
+    """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
+
+    One result of each kind is kept: a factor of a large model fills most of the memory.
+    """
+    cache: dict[str, Any] = ctx.state.setdefault("factors", {})
+    parts = [*k.matrices, *k.conditions]
+    key = (node_store(ctx).version, extra, *(id(part) for part in parts))
+    found = cache.get(kind)
+    if found is None or found[0] != key:
+        cache.clear()
+        found = cache[kind] = key, parts, make()  # the parts stay alive, so that their ids are not used again
+    return found[2]
+
+
+def tell_notes(ctx: Context, solver: Factor) -> None:
+    """Warn about a slow package, or one that failed."""
+    for note in solver.notes:
+        ctx.warn("G201", "{note}", note=note)
+
+
+# -- conditions ------------------------------------------------------------------------------------------------------
+
+
+def reduced(ctx: Context, system: System, imposed: FloatArray) -> Reduction:
+    """Eliminate the conditions of a system, or fail with G407 naming those that contradict each other."""
+    try:
+        reduction = reduce_conditions(system.C, imposed)
+    except k_errors.ContradictoryConditions as failure:
+        ctx.fail(
+            "G407",
+            "conditions contradict each other at ({where}), by {gap}: {conditions}",
+            at="k",
+            where=_place(system, int(failure.rows[-1])),
+            gap=f"{failure.residual:.3g}",
+            conditions=", ".join(_origins(system, failure.rows)),
+            hint="they prescribe different values of the same unknowns: leave one out, or give both the same DEPI",
+        )
+    if len(reduction.redundant) and ctx.option("ECHO") >= 1:
+        names = ", ".join(_origins(system, reduction.redundant))
+        ctx.write(f" RESO : {len(reduction.redundant)} conditions repeat others and are left out: {names}")
+    return reduction
+
+
+def _origins(system: System, rows: IntArray) -> list[str]:
+    """Return what the user wrote for some rows of the conditions, each once."""
+    starts = np.cumsum([0, *(len(c.multipliers) for c in system.conditions)])
+    parts = np.unique(np.searchsorted(starts, rows, side="right") - 1)
+    return list(dict.fromkeys(system.conditions[int(p)].origin for p in parts))
+
+
+def _place(system: System, row: int) -> str:
+    """Return the coordinates where a condition stands."""
+    point = system.store.coords[system.multipliers[row]][: max(system.dim, 2)]
+    return " ".join(f"{x:g}" for x in point)
+
+
+# -- free motions and singular systems -------------------------------------------------------------------------------
+
+
+def check_held(ctx: Context, system: System, contact_rows: Any = None) -> None:
+    """Fail with G404 when a solid can move as a rigid body, naming the motion."""
+    if system.names not in ELASTIC:
+        return
+    C = system.C if contact_rows is None else sp.vstack([system.C, contact_rows])
+    motions = free_motions(system.K, system.points, C)
+    if motions:
+        shown = "; ".join(_motion(m) for m in motions[:3]) + ("; ..." if len(motions) > 3 else "")
+        ctx.fail(
+            "G404",
+            "nothing stops {count} rigid motions: {motions}",
+            at="k",
+            count=len(motions),
+            motions=shown,
+            hint="hold the solid with BLOQ or SYMT, or join its contact conditions to the matrix",
+        )
+
+
+def _motion(motion: FreeMotion) -> str:
+    """Name a free motion and the solid that makes it, counted from 1."""
+    who = " and ".join(f"solid {i + 1}" for i in motion.solids)
+    centre = ", ".join(f"{x:g}" for x in motion.centre)
+    return f"{who}, centred at ({centre}): {motion.movement}"
+
+
+def singular(ctx: Context, system: System, failure: k_errors.SingularSystem, numbers: IntArray | None) -> NoReturn:
+    """Fail with error 49, naming the unknowns that nothing holds; `numbers` are theirs in the system."""
+    if numbers is None or not len(failure.unknowns):
+        ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
+    unknowns = numbers[failure.unknowns]
+    named = [
+        f"{system.names[i % system.dim]} at ({' '.join(f'{x:g}' for x in system.points[i // system.dim])})"
+        for i in unknowns[:3].tolist()
+    ]
+    ctx.fail(
+        49,
+        "the system is singular: {count} unknowns can change without force, {which}",
+        at="k",
+        count=len(unknowns),
+        which=", ".join(named) + (", ..." if len(unknowns) > 3 else ""),
+        hint="hold them with BLOQ; parts that share only a node or an edge can turn about it",
+    )
+
+
+# -- solution --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(eq=False)
+class _Solver:
+    """A factor, how it was chosen, and how many solutions it has given."""
+
+    factor: Factor
+    choice: Choice
+    solved: int = 0
+
+
+def solve_linear(
+    ctx: Context, k: Rigidite, system: System, loads: list[tuple[FloatArray, FloatArray]], precision: float | None
+) -> list[ChPoint]:
+    """Solve for several second members with one factorisation, kept for the next call with the same matrix."""
+    F = np.column_stack([force for force, _ in loads])
+    reduction = reduced(ctx, system, np.column_stack([values for _, values in loads]))
+    wish = _wish(ctx)
+
+    def choice(solutions: int) -> Choice:
+        entries, dim = system.K.nnz, system.dim
+        return choose(len(reduction.free), entries, dim, solutions, wish=wish, elastic=system.names in ELASTIC)
+
+    def make(solutions: int) -> _Solver:
+        check_held(ctx, system)
+        return _factorised(ctx, system, reduction, choice(solutions), wish, precision)
+
+    count = F.shape[1]
+    extra = "linear", wish, precision
+    solver: _Solver = kept(ctx, "factor", k, extra, lambda: make(count))
+    solver.solved += count
+    if solver.choice.method != "auto" and choice(solver.solved).method == "auto":
+        ctx.state["factors"].clear()
+        total = solver.solved
+        solver = kept(ctx, "factor", k, extra, lambda: make(total))
+        solver.solved = total
+    v = _solution(ctx, system, reduction, solver, reduction.load(system.K, F))
+    tell_notes(ctx, solver.factor)
+    u = reduction.expand(v)
+    r = reduction.reactions(system.K, u, F)
+    _check_energy(ctx, system, u, F, r)
+    m = reduction.multipliers(r)
+    return [system.field(u[:, i], m[:, i]) for i in range(count)]
+
+
+def _wish(ctx: Context) -> str:
+    word = str(ctx.session.options.get("RESO") or "")[:4]
+    if word not in ("", "DIRE", "ITER"):
+        ctx.fail(19, "OPTI 'RESO' '{word}' is not available", word=word, hint="'DIRE', 'ITER', or neither")
+    return word
+
+
+def _factorised(
+    ctx: Context, system: System, reduction: Reduction, choice: Choice, wish: str, precision: float | None
+) -> _Solver:
+    """Say the choice and prepare the solver."""
+    if ctx.option("ECHO") >= 1:
+        name = choice.method if choice.method != "auto" else next(p for p in DIRECT if is_installed(p))
+        ctx.write(f" RESO : {len(reduction.free)} equations, {METHODS[name]}, about {choice.memory / 1e9:.2g} Gbyte")
+    try:
+        if choice.method == "auto":
+            return _Solver(factorize(reduction.matrix(system.K)), choice)
+        modes = None
+        if system.names in ELASTIC:
+            modes = rigid_modes(system.points, system.points.mean(axis=0))
+            eliminated = np.ones(len(modes), bool)
+            eliminated[reduction.free] = False
+            modes[eliminated] = 0.0
+        default = 1e-12 if wish == "ITER" else 1e-10
+        factor = factorize(
+            reduction.whole_matrix(system.K, system.dim),
+            method=choice.method,
+            near_null=modes,
+            block=system.dim,
+            tolerance=default if precision is None else min(max(precision, 1e-14), 1e-2),
+            reserve=choice.reserve,
+        )
+    except k_errors.SingularSystem as failure:
+        singular(ctx, system, failure, reduction.free if choice.method == "auto" else np.arange(reduction.n))
+    return _Solver(factor, choice)
+
+
+def _solution(ctx: Context, system: System, reduction: Reduction, solver: _Solver, load: FloatArray) -> FloatArray:
+    """Return the free unknowns, (n_free, k)."""
+    whole = solver.choice.method != "auto"
+    try:
+        if not whole:
+            return solver.factor.solve(load)
+        padded = np.zeros((reduction.n, load.shape[1]))
+        padded[reduction.free] = load
+        return np.asarray(solver.factor.solve(padded)[reduction.free])
+    except k_errors.SingularSystem as failure:
+        singular(ctx, system, failure, np.arange(reduction.n) if whole else reduction.free)
+
+
+def _check_energy(ctx: Context, system: System, u: FloatArray, F: FloatArray, r: FloatArray) -> None:
+    """Warn when the strain energy of a solution is not the work of loads and reactions."""
+    energy = np.einsum("ij,ij->j", u, system.K @ u)
+    work = np.einsum("ij,ij->j", u, F + r)
+    size = np.maximum(np.abs(energy), np.abs(work))
+    gap = np.divide(np.abs(energy - work), size, out=np.zeros_like(size), where=size > 0)
+    if gap.max(initial=0.0) > ENERGY_LIMIT:
+        ctx.warn(
+            "G413",
+            "the strain energy of the solution differs from the work of the loads by {gap} of it",
+            gap=f"{gap.max():.1e}",
+            hint="the matrix is ill conditioned: very different stiffnesses, flat elements, or a solid barely held",
+        )
