@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import CHPOINT, FLOTTANT, RIGIDITE, TABLE, Table
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, RIGIDITE, TABLE, Table
 from gibiane_ops.kernels import errors as k_errors
-from gibiane_ops.kernels.contact.condense import Condensation, condense
-from gibiane_ops.kernels.contact.newton import solve_coulomb
-from gibiane_ops.kernels.contact.pairs import facets_of_body
-from gibiane_ops.kernels.contact.report import ContactState
-from gibiane_ops.kernels.contact.status import solve_statuses
+from gibiane_ops.kernels.constraints import reduce_conditions
+from gibiane_ops.kernels.solve import Factor, factorize
 from gibiane_ops.values.champs import DISCRET, ChPoint
+from gibiane_ops.values.contact_solution import Wishes, solve_contact
 from gibiane_ops.values.failures import worded
-from gibiane_ops.values.linear import check_held, kept, reduced, solve_linear, tell_notes
+from gibiane_ops.values.methods import PLAIN, STATUSES, WITH_R, Method
 from gibiane_ops.values.nodes import FloatArray, node_store
-from gibiane_ops.values.rapport import fill_report
 from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.solving import check_held, kept, tell_notes
 from gibiane_ops.values.system import System, build
 
 RESO = operator(
@@ -29,16 +26,28 @@ RESO = operator(
     topic="resolution",
     summary="solve a linear system with its conditions, and contact with friction",
     notice="`U = RESO K F`: K joins stiffness, conditions (BLOQ, SYMT, RELA) and contact conditions (RIGI of a contact "
-    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members, and further calls with the "
-    "same matrices, share one factorisation. A single solution of a large solid comes from conjugate gradients with "
-    "algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into the "
-    "memory; OPTI 'RESO' 'DIRE' or 'ITER' chooses instead, OPTI 'ECHO' 1 tells. With contact the default is 'NEWT', the exact solution by a semi-smooth Newton method on the "
-    "unknowns of the interface; 'STATUT' is the fixed point of statuses of Becheur, Tahakourt and Coorevits 2008, "
-    "which holds no node inside the cone and keeps an error of its own. 'RAPP' T fills a table: CONVERGE, "
-    "ITERATIONS, STATUTS (open, stick, slip), PENETRATION, CONE, PUISSANCE, HISTOIRE. 'DEPA' U starts from another "
-    "solution. 'SOUC' turns a failure to converge into a warning and gives the best iterate. 'NOID' ignores the "
-    "part of the load that the matrix does not know. LX holds the multipliers of the conditions, on nodes of their "
-    "own.",
+    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members give several solutions with "
+    "one factorisation. Conditions with MINI or MAXI act like contact; 'NOUN' makes equalities of them, and ties "
+    "contact surfaces. 'NOID' ignores the part of the load that the matrix does not know. LX holds the multipliers of"
+    " the conditions, on nodes of their own. Contact methods; the interface is condensed once for all of them, and r "
+    "is a multiple of its stiffness, so that no result depends on units. 'NEWT' (default): exact, 1 to 10 dense "
+    "factorisations; falls back on damped steps; above MU about 1 one of several solutions ('UNIQ' looks for others)."
+    " 'TRES': friction bound frozen, solved, updated; same solution, 4 to 20 times the cost; does not contract for "
+    "large MU. 'MULT': multipliers and active set; same solution; no safeguard, statuses may cycle (G406). 'PENA' r: "
+    "springs; the error is about 1/r (r = 1E4 gives 4 digits, r < 1 is wrong with a good residual), and the "
+    "penetration is in the report. 'PERT' r: perturbed Lagrangian, the same result. 'AUGM' r: augmented Lagrangian by"
+    " Newton without safeguard; exact. 'UZAW' r: by updates of the multipliers; exact; 4 passes at r = 1000, 32 at r "
+    "= 1, more than 400 at r = 0.01. 'PROJ': projected Gauss-Seidel; exact to 1E-8; tens to thousands of sweeps, no "
+    "factorisation: an independent check. 'PCG': projected conjugate gradients, contact without friction only. 'BIPO'"
+    " r: bipotential; exact to 1E-8; 40 iterations at r = 1, in proportion more on both sides; Coulomb's law only. "
+    "'STATUT' (Sn (St (tol))): the fixed point of statuses of Becheur, Tahakourt and Coorevits 2008; it holds no node"
+    " inside the cone and keeps an error of its own. Sn is the penetration from which a node closes; with St above 0 "
+    "nodes inside the cone are held, and a sliding node sticks again when its slip is below St: this cycles when St "
+    "is of the order of the slip. 'TOLE' x and 'ITMA' n change the tolerance (relative residual) and the largest "
+    "number of iterations. 'HIST' U0: slip counts from the solution U0 of the load step before. 'DEPA' U1: start of "
+    "the iterations. 'RAPP' T fills a table: CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION,"
+    " CONE, PUISSANCE, EQUILIBRE, DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE, HISTOIRE, "
+    "MESSAGE. 'SOUC' turns a failure to converge into a warning and gives the best iterate.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
     "CL = BLOQ 'DEPL' (S POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"
@@ -48,18 +57,30 @@ RESO = operator(
     source="semi-smooth Newton: Alart and Curnier 1991",
 )
 
-METHODS = ("NEWT", "STATUT")
-
 
 @RESO.form(
     Arg("k", RIGIDITE, "stiffness and conditions"),
     Arg("f", CHPOINT, "second members", many=True),
-    Arg("prec", FLOTTANT, "relative residual of iterations", optional=True),
-    Key(METHODS, "contact method", name="method"),
+    Key(tuple(PLAIN), "contact method", name="method"),
+    Key(
+        tuple(WITH_R), "contact method with a parameter", Arg("r", FLOTTANT, "multiple of the stiffness"), name="with_r"
+    ),
+    Key(
+        STATUSES,
+        "fixed point of statuses",
+        Arg("sn", FLOTTANT, "closing distance", optional=True),
+        Arg("st", FLOTTANT, "sticking distance", optional=True),
+        Arg("tol", FLOTTANT, "tolerance", optional=True),
+        name="statuses",
+    ),
     Key("RAPP", "report to fill", Arg("t", TABLE)),
-    Key("DEPA", "start of the contact iterations", Arg("u", CHPOINT)),
+    Key("HIST", "solution of the load step before", Arg("u0", CHPOINT)),
+    Key("DEPA", "start of the contact iterations", Arg("u1", CHPOINT)),
     Key("TOLE", "tolerance of the contact iterations", Arg("x", FLOTTANT)),
+    Key("ITMA", "largest number of contact iterations", Arg("n", ENTIER)),
+    Key("UNIQ", "look for other solutions"),
     Key("SOUC", "unconverged contact is a warning"),
+    Key("NOUN", "unilateral conditions are equalities"),
     Key("NOID", "ignore what the matrix does not know"),
     gives=["CHPOINT..."],
 )
@@ -67,182 +88,90 @@ def _reso(
     ctx: Context,
     k: Rigidite,
     f: list[ChPoint],
-    prec: float | None,
     method: str | None,
+    with_r: tuple[str, float] | None,
+    statuses: tuple[float | None, ...] | None,
     rapp: Table | None,
+    hist: ChPoint | None,
     depa: ChPoint | None,
     tole: float | None,
+    itma: int | None,
+    uniq: bool,
     souc: bool,
+    noun: bool,
     noid: bool,
 ) -> Any:
-    system = build(ctx, k)
+    system = build(ctx, k, bilateral=noun)
     loads = [system.load(ctx, field, lenient=noid) for field in f]
-    _check_sense(ctx, system)
-    if system.contacts:
-        results = [
-            _contact(ctx, k, system, field, load, method or "NEWT", rapp, tole, souc)
-            for field, load in zip(f, loads, strict=True)
-        ]
-    else:
-        results = solve_linear(ctx, k, system, loads, prec)
-    return tuple(results)
+    if system.contacts or system.stops.shape[0]:
+        chosen = _method(ctx, method, with_r, statuses, tole, itma)
+        wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq)
+        return tuple(solve_contact(ctx, k, system, *pair, wishes) for pair in zip(f, loads, strict=True))
+    return tuple(_linear(ctx, k, system, loads))
 
 
-def _check_sense(ctx: Context, system: System) -> None:
-    for part in system.conditions:
-        if part.sense != "=":
+def _method(
+    ctx: Context,
+    plain: str | None,
+    with_r: tuple[str, float] | None,
+    statuses: tuple[float | None, ...] | None,
+    tolerance: float | None,
+    max_iter: int | None,
+) -> Method:
+    """Gather the method and its numbers, within their ranges."""
+    if sum(given is not None for given in (plain, with_r, statuses)) > 1:
+        ctx.fail(26, "one contact method at a time", at="with_r" if with_r else "statuses")
+    if tolerance is not None and not 0 < tolerance < 1:
+        ctx.fail(41, "TOLE = {value}: the tolerance is between 0 and 1", at="tole", value=float(tolerance))
+    if max_iter is not None and max_iter < 1:
+        ctx.fail(41, "ITMA = {value}: at least one iteration", at="itma", value=max_iter)
+    common = {"tolerance": tolerance, "max_iter": max_iter}
+    if with_r is not None:
+        name, r = with_r[0], float(with_r[1])
+        if not r > 0:
             ctx.fail(
-                251,
-                "{which}: conditions with MINI or MAXI are not available yet",
+                41,
+                "{name} r = {value}: r is positive, a multiple of the stiffness of the interface",
+                at="with_r",
+                name=name,
+                value=r,
+                hint="1.E4 suits most models",
+            )
+        return Method(name, r=r, **common)
+    if statuses is not None:
+        distances = [None if x is None else float(x) for x in statuses]
+        if any(x is not None and not x >= 0 for x in distances):
+            ctx.fail(41, "the thresholds of STATUT cannot be negative", at="statuses")
+        closing, sticking, own = distances
+        return Method(STATUSES, thresholds=(closing, sticking or None, own), **common)
+    return Method(plain or "NEWT", **common)
+
+
+def _linear(ctx: Context, k: Rigidite, system: System, loads: list[tuple[FloatArray, FloatArray]]) -> list[ChPoint]:
+    forces = np.column_stack([force for force, _ in loads])
+    imposed = np.column_stack([values for _, values in loads])
+    with worded(ctx, at="k"):
+        reduction = reduce_conditions(system.C, imposed)
+
+    def factor() -> Factor:
+        check_held(ctx, system)
+        try:
+            return factorize(reduction.matrix(system.K))
+        except k_errors.SingularSystem as failure:
+            ctx.fail(
+                49,
+                "the system is singular: {reason}",
                 at="k",
-                which=part.origin,
-                hint="contact between surfaces is: MODE G1 G2 'CONTACT'",
+                reason=str(failure),
+                hint="is every solid held, and every element sound?",
             )
 
-
-def _contact(
-    ctx: Context,
-    k: Rigidite,
-    system: System,
-    field: ChPoint,
-    load: tuple[FloatArray, FloatArray],
-    method: str,
-    report: Table | None,
-    tolerance: float | None,
-    lenient: bool,
-) -> ChPoint:
-    F, imposed = load
-    _check_normals(ctx, k, system)
-    pairs = system.pairs(system.gaps(field))
-    if (pairs.gap < 0).any():
-        worst = int(np.argmin(pairs.gap))
-        where = " ".join(f"{x:g}" for x in pairs.points[worst])
-        ctx.fail(
-            "G403",
-            "the solids penetrate each other at {count} nodes before any load, most at ({where}): {depth}",
-            at="k",
-            count=int((pairs.gap < 0).sum()),
-            where=where,
-            depth=f"{-pairs.gap[worst]:.3g}",
-            hint="move one solid, or give the gap: MATE MC 'JEU' 0.",
-        )
-    reduction = reduced(ctx, system, imposed)
-
-    def condensed() -> Condensation:
-        check_held(ctx, system, _tied_rows(system, pairs.pairs))
-        try:
-            return condense(system.K, pairs, reduction)
-        except k_errors.SingularSystem as failure:
-            ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
-
-    with worded(ctx, at="k"):
-        condensation: Condensation = kept(
-            ctx, "contact", k, (pairs.pairs.tobytes(), pairs.normals.tobytes()), condensed
-        )
-        interface = _with_gap(condensation, pairs.gap).interface(F, reduction.offset)
-    tell_notes(ctx, condensation.factor)
-    options = {} if tolerance is None else {"tolerance": tolerance}
-    mu = system.friction()
-    state: ContactState
-    converged = True
-    try:
-        state = (
-            solve_statuses(interface, mu, **options) if method == "STATUT" else solve_coulomb(interface, mu, **options)
-        )
-    except (k_errors.NotConverged, k_errors.StatusCycle, k_errors.ContactUnbalanced) as failure:
-        best = failure.best
-        if not lenient or not isinstance(best, ContactState):
-            _unconverged(ctx, failure, method, report)
-        ctx.warn(1119, "contact has not converged: {reason}", reason=str(failure), at="k")
-        state, converged = best, False
-    if report is not None:
-        fill_report(report, method, state, converged)
-    u = interface.expand(state.w)
-    forces = np.zeros_like(u).reshape(-1, system.dim)
-    vector = interface.to_global(state.r)
-    np.add.at(forces, pairs.pairs[:, 0], vector)
-    np.add.at(forces, pairs.pairs[:, 1], -vector)
-    m = reduction.multipliers(reduction.reactions(system.K, u, F + forces.ravel()))
-    return _with_contact_forces(system, system.field(u, m), state, vector)
-
-
-def _with_gap(condensation: Condensation, gap: FloatArray) -> Condensation:
-    return replace(condensation, contact=replace(condensation.contact, gap=gap))
-
-
-def _tied_rows(system: System, pairs: Any) -> Any:
-    import scipy.sparse as sp
-
-    n, d = len(pairs), system.dim
-    row = np.repeat(np.arange(n * d), 2)
-    slave = pairs[:, :1] * d + np.arange(d)
-    master = pairs[:, 1:] * d + np.arange(d)
-    column = np.stack([slave.ravel(), master.ravel()], axis=1).ravel()
-    return sp.csr_array((np.tile([1.0, -1.0], n * d), (row, column)), shape=(n * d, system.K.shape[0]))
-
-
-def _check_normals(ctx: Context, k: Rigidite, system: System) -> None:
-    """Fail with G402 when the normals of a slave surface point into its own solid."""
-    blocks = [b for part in k.matrices if part.mesh is not None for b in part.mesh.kernel_blocks]
-    for part in system.contacts:
-        for name, cells in part.zone.slave.kernel_blocks:
-            try:
-                turned = facets_of_body(blocks, [(name, cells)])[0][1]
-            except k_errors.EmptyContact:
-                continue
-            X = system.store.coords[:, : system.dim]
-            from gibiane_ops.kernels.elements.table import shape
-            from gibiane_ops.kernels.geometry import facet_normals
-
-            given, outward = (facet_normals(shape(name), X[c]) for c in (cells, turned))
-            wrong = int((np.einsum("mi,mi->m", given, outward) < 0).sum())
-            if wrong:
-                ctx.fail(
-                    "G402",
-                    "the normals of {count} facets of the slave surface point into their solid",
-                    at="k",
-                    count=wrong,
-                    hint="take the surface with FACE or ENVE, or turn it with ORIE or INVE",
-                )
-
-
-def _with_contact_forces(system: System, u: ChPoint, state: ContactState, vector: FloatArray) -> ChPoint:
-    nodes = np.concatenate([part.multipliers for part in system.contacts])
-    parts = dict(u.parts)
-    own, values = parts.get("LX", (np.zeros(0, np.int64), np.zeros(0)))
-    parts["LX"] = (np.concatenate([own, nodes]), np.concatenate([values, state.r[:, 0]]))
-    for i, name in enumerate(("LFX", "LFY", "LFZ")[: system.dim]):
-        parts[name] = (nodes, vector[:, i])
-    return ChPoint(system.store, parts, u.nature)
-
-
-def _unconverged(ctx: Context, failure: Any, method: str, report: Table | None) -> None:
-    best = failure.best
-    if report is not None and isinstance(best, ContactState):
-        fill_report(report, method, best, converged=False)
-    if isinstance(failure, k_errors.ContactUnbalanced):
-        ctx.fail(
-            "G405",
-            "contact cannot balance the load: {reason}",
-            at="k",
-            reason=str(failure),
-            hint="reduce the tangential load, raise MU, or hold the solid",
-        )
-    if isinstance(failure, k_errors.StatusCycle):
-        ctx.fail(
-            "G406",
-            "the fixed point of statuses cycles: {reason}",
-            at="k",
-            reason=str(failure),
-            hint="use the default method 'NEWT'",
-        )
-    ctx.fail(
-        1119,
-        "contact has not converged: {reason}",
-        at="k",
-        reason=str(failure),
-        hint="'RAPP' T keeps the history; 'SOUC' gives the best iterate",
-    )
+    solver: Factor = kept(ctx, "factor", k, system.C.shape[0], factor)
+    v = solver.solve(reduction.load(system.K, forces))
+    tell_notes(ctx, solver)
+    u = reduction.expand(v)
+    m = reduction.multipliers(reduction.reactions(system.K, u, forces))
+    return [system.field(u[:, i], m[:, i]) for i in range(u.shape[1])]
 
 
 REAC = operator(
@@ -272,10 +201,11 @@ def _reac(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
             chosen = part.name == name
             terms.setdefault("F" + str(name)[1:], []).append((nodes[chosen], force[chosen]))
     for contact in k.contacts:
-        slave, master = store.canonical(contact.pairs.pairs).T
+        slave, master = store.canonical(np.maximum(contact.pairs.pairs, 0)).T
+        solid = contact.pairs.pairs[:, 1] >= 0
         for axis in "XYZ"[: contact.pairs.normals.shape[1]]:
             force = u.at("LF" + axis, contact.multipliers)
-            terms.setdefault("F" + axis, []).extend([(slave, force), (master, -force)])
+            terms.setdefault("F" + axis, []).extend([(slave, force), (master[solid], -force[solid])])
     parts = {}
     for name, pieces in terms.items():
         nodes, inverse = np.unique(np.concatenate([n for n, _ in pieces]), return_inverse=True)
