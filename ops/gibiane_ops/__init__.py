@@ -152,7 +152,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "DEFORME": ("gibiane_ops.output.shapes",),
     "VECTEUR": ("gibiane_ops.output.shapes",),
     "TRACER": ("gibiane_ops.output.trace",),
-    "DESSINER": ("gibiane_ops.output.draw",),
+    "DESSIN": ("gibiane_ops.output.draw",),
     # operators of the language with further forms
     "ET": ("gibiane_ops.lists.access", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
     "EXISTE": ("gibiane_ops.fields.components", "gibiane_ops.lists.sorting"),

@@ -34,7 +34,7 @@ MARKS = {
 PLACES = ("NO", "NE", "SO", "SE", "EXT", "XY", "CENT", "EXCE")
 
 DESS = operator(
-    "DESSINER",
+    "DESSIN",
     topic="output",
     summary="draw curves into a file",
     notice="The curves of an EVOLUTIO. 'TITR' 'TITX' 'TITY' give titles, 'XBOR' 'YBOR' the ends of the axes, 'LOGX' "

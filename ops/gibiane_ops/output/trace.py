@@ -56,7 +56,7 @@ TRAC = operator(
     "Needs matplotlib; pictures never change results.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ;\n"
     "TRAC S 'TITR' 'a square' ; TRAC (COOR 1 S) S ;",
-    see=["DESSINER", "DEFORME", "VECTEUR", "SORTIR"],
+    see=["DESSIN", "DEFORME", "VECTEUR", "SORTIR"],
 )
 
 
