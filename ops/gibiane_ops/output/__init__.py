@@ -1,1 +1,1 @@
-"""Operators that make pictures and files: DEFORME, VECTEUR, TRACER, DESSINER, SORTIR 'VTK'."""
+"""Operators that make pictures and files: DEFORME, VECTEUR, TRACER, DESSIN, SORTIR 'VTK'."""

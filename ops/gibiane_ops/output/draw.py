@@ -1,4 +1,4 @@
-"""DESSINER: curves into a picture."""
+"""DESSIN: curves into a picture."""
 
 from __future__ import annotations
 
