@@ -9,44 +9,43 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, RIGIDITE, TABLE, Table
-from gibiane_ops.kernels import errors as k_errors
-from gibiane_ops.kernels.constraints import reduce_conditions
-from gibiane_ops.kernels.solve import Factor, factorize
 from gibiane_ops.values.champs import DISCRET, ChPoint
 from gibiane_ops.values.contact_solution import Wishes, solve_contact
-from gibiane_ops.values.failures import worded
+from gibiane_ops.values.linear import solve_linear
 from gibiane_ops.values.methods import PLAIN, STATUSES, WITH_R, Method
-from gibiane_ops.values.nodes import FloatArray, node_store
+from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
-from gibiane_ops.values.solving import check_held, kept, tell_notes
-from gibiane_ops.values.system import System, build
+from gibiane_ops.values.system import build
 
 RESO = operator(
     "RESO",
     topic="resolution",
     summary="solve a linear system with its conditions, and contact with friction",
     notice="`U = RESO K F`: K joins stiffness, conditions (BLOQ, SYMT, RELA) and contact conditions (RIGI of a contact "
-    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members give several solutions with "
-    "one factorisation. Conditions with MINI or MAXI act like contact; 'NOUN' makes equalities of them, and ties "
-    "contact surfaces. 'NOID' ignores the part of the load that the matrix does not know. LX holds the multipliers of"
-    " the conditions, on nodes of their own. Contact methods; the interface is condensed once for all of them, and r "
-    "is a multiple of its stiffness, so that no result depends on units. 'NEWT' (default): exact, 1 to 10 dense "
-    "factorisations; falls back on damped steps; above MU about 1 one of several solutions ('UNIQ' looks for others)."
-    " 'TRES': friction bound frozen, solved, updated; same solution, 4 to 20 times the cost; does not contract for "
-    "large MU. 'MULT': multipliers and active set; same solution; no safeguard, statuses may cycle (G406). 'PENA' r: "
-    "springs; the error is about 1/r (r = 1E4 gives 4 digits, r < 1 is wrong with a good residual), and the "
-    "penetration is in the report. 'PERT' r: perturbed Lagrangian, the same result. 'AUGM' r: augmented Lagrangian by"
-    " Newton without safeguard; exact. 'UZAW' r: by updates of the multipliers; exact; 4 passes at r = 1000, 32 at r "
-    "= 1, more than 400 at r = 0.01. 'PROJ': projected Gauss-Seidel; exact to 1E-8; tens to thousands of sweeps, no "
-    "factorisation: an independent check. 'PCG': projected conjugate gradients, contact without friction only. 'BIPO'"
-    " r: bipotential; exact to 1E-8; 40 iterations at r = 1, in proportion more on both sides; Coulomb's law only. "
-    "'STATUT' (Sn (St (tol))): the fixed point of statuses of Becheur, Tahakourt and Coorevits 2008; it holds no node"
-    " inside the cone and keeps an error of its own. Sn is the penetration from which a node closes; with St above 0 "
-    "nodes inside the cone are held, and a sliding node sticks again when its slip is below St: this cycles when St "
-    "is of the order of the slip. 'TOLE' x and 'ITMA' n change the tolerance (relative residual) and the largest "
-    "number of iterations. 'HIST' U0: slip counts from the solution U0 of the load step before. 'DEPA' U1: start of "
-    "the iterations. 'RAPP' T fills a table: CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION,"
-    " CONE, PUISSANCE, EQUILIBRE, DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE, HISTOIRE, "
+    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members and further calls with the"
+    " same matrices share one factorisation. A single solution of a large solid comes from conjugate gradients with"
+    " algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into "
+    "the memory; OPTI 'RESO' 'DIRE' or 'ITER' chooses instead, OPTI 'ECHO' 1 tells. Conditions with MINI or MAXI "
+    "act like contact; 'NOUN' makes equalities of them, and ties contact surfaces. 'NOID' ignores the part of the "
+    "load that the matrix does not know. LX holds the multipliers of the conditions, on nodes of their own. Contact"
+    " methods; the interface is condensed once for all of them, and r is a multiple of its stiffness, so that no "
+    "result depends on units. 'NEWT' (default): exact, 1 to 10 dense factorisations; falls back on damped steps; "
+    "above MU about 1 one of several solutions ('UNIQ' looks for others). 'TRES': friction bound frozen, solved, "
+    "updated; same solution, 4 to 20 times the cost; does not contract for large MU. 'MULT': multipliers and active"
+    " set; same solution; no safeguard, statuses may cycle (G406). 'PENA' r: springs; the error is about 1/r (r = "
+    "1E4 gives 4 digits, r < 1 is wrong with a good residual), and the penetration is in the report. 'PERT' r: "
+    "perturbed Lagrangian, the same result. 'AUGM' r: augmented Lagrangian by Newton without safeguard; exact. "
+    "'UZAW' r: by updates of the multipliers; exact; 4 passes at r = 1000, 32 at r = 1, more than 400 at r = 0.01. "
+    "'PROJ': projected Gauss-Seidel; exact to 1E-8; tens to thousands of sweeps, no factorisation: an independent "
+    "check. 'PCG': projected conjugate gradients, contact without friction only. 'BIPO' r: bipotential; exact to "
+    "1E-8; 40 iterations at r = 1, in proportion more on both sides; Coulomb's law only. 'STATUT' (Sn (St (tol))): "
+    "the fixed point of statuses of Becheur, Tahakourt and Coorevits 2008; it holds no node inside the cone and "
+    "keeps an error of its own. Sn is the penetration from which a node closes; with St above 0 nodes inside the "
+    "cone are held, and a sliding node sticks again when its slip is below St: this cycles when St is of the order "
+    "of the slip. 'TOLE' x and 'ITMA' n change the tolerance (relative residual) and the largest number of "
+    "iterations. 'HIST' U0: slip counts from the solution U0 of the load step before. 'DEPA' U1: start of the "
+    "iterations. 'RAPP' T fills a table: CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION, "
+    "CONE, PUISSANCE, EQUILIBRE, DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE, HISTOIRE, "
     "MESSAGE. 'SOUC' turns a failure to converge into a warning and gives the best iterate.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
@@ -61,6 +60,7 @@ RESO = operator(
 @RESO.form(
     Arg("k", RIGIDITE, "stiffness and conditions"),
     Arg("f", CHPOINT, "second members", many=True),
+    Arg("prec", FLOTTANT, "relative residual of iterations", optional=True),
     Key(tuple(PLAIN), "contact method", name="method"),
     Key(
         tuple(WITH_R), "contact method with a parameter", Arg("r", FLOTTANT, "multiple of the stiffness"), name="with_r"
@@ -88,6 +88,7 @@ def _reso(
     ctx: Context,
     k: Rigidite,
     f: list[ChPoint],
+    prec: float | None,
     method: str | None,
     with_r: tuple[str, float] | None,
     statuses: tuple[float | None, ...] | None,
@@ -107,7 +108,7 @@ def _reso(
         chosen = _method(ctx, method, with_r, statuses, tole, itma)
         wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq)
         return tuple(solve_contact(ctx, k, system, *pair, wishes) for pair in zip(f, loads, strict=True))
-    return tuple(_linear(ctx, k, system, loads))
+    return tuple(solve_linear(ctx, k, system, loads, prec))
 
 
 def _method(
@@ -125,7 +126,6 @@ def _method(
         ctx.fail(41, "TOLE = {value}: the tolerance is between 0 and 1", at="tole", value=float(tolerance))
     if max_iter is not None and max_iter < 1:
         ctx.fail(41, "ITMA = {value}: at least one iteration", at="itma", value=max_iter)
-    common = {"tolerance": tolerance, "max_iter": max_iter}
     if with_r is not None:
         name, r = with_r[0], float(with_r[1])
         if not r > 0:
@@ -137,41 +137,15 @@ def _method(
                 value=r,
                 hint="1.E4 suits most models",
             )
-        return Method(name, r=r, **common)
+        return Method(name, r=r, tolerance=tolerance, max_iter=max_iter)
     if statuses is not None:
         distances = [None if x is None else float(x) for x in statuses]
         if any(x is not None and not x >= 0 for x in distances):
             ctx.fail(41, "the thresholds of STATUT cannot be negative", at="statuses")
         closing, sticking, own = distances
-        return Method(STATUSES, thresholds=(closing, sticking or None, own), **common)
-    return Method(plain or "NEWT", **common)
-
-
-def _linear(ctx: Context, k: Rigidite, system: System, loads: list[tuple[FloatArray, FloatArray]]) -> list[ChPoint]:
-    forces = np.column_stack([force for force, _ in loads])
-    imposed = np.column_stack([values for _, values in loads])
-    with worded(ctx, at="k"):
-        reduction = reduce_conditions(system.C, imposed)
-
-    def factor() -> Factor:
-        check_held(ctx, system)
-        try:
-            return factorize(reduction.matrix(system.K))
-        except k_errors.SingularSystem as failure:
-            ctx.fail(
-                49,
-                "the system is singular: {reason}",
-                at="k",
-                reason=str(failure),
-                hint="is every solid held, and every element sound?",
-            )
-
-    solver: Factor = kept(ctx, "factor", k, system.C.shape[0], factor)
-    v = solver.solve(reduction.load(system.K, forces))
-    tell_notes(ctx, solver)
-    u = reduction.expand(v)
-    m = reduction.multipliers(reduction.reactions(system.K, u, forces))
-    return [system.field(u[:, i], m[:, i]) for i in range(u.shape[1])]
+        thresholds = (closing, sticking or None, own)
+        return Method(STATUSES, thresholds=thresholds, tolerance=tolerance, max_iter=max_iter)
+    return Method(plain or "NEWT", tolerance=tolerance, max_iter=max_iter)
 
 
 REAC = operator(

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
-import scipy.sparse as sp
 
 from gibiane.registry import Context
 from gibiane_ops.kernels import errors as k_errors
 from gibiane_ops.kernels.choice import Choice, choose
 from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
 from gibiane_ops.kernels.packages import DIRECT, is_installed
-from gibiane_ops.kernels.rigid import FreeMotion, free_motions, rigid_modes
+from gibiane_ops.kernels.rigid import rigid_modes
 from gibiane_ops.kernels.solve import Factor, factorize
 from gibiane_ops.values.champs import ChPoint
-from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+from gibiane_ops.values.nodes import FloatArray, IntArray
 from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.solving import check_held, kept, tell_notes
 from gibiane_ops.values.system import System
 
 ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
@@ -32,27 +31,6 @@ METHODS = {
     "amg": "conjugate gradients with algebraic multigrid (pyamg)",
     "cg": "conjugate gradients with block diagonal preconditioner",
 }
-
-
-def kept(ctx: Context, kind: str, k: Rigidite, extra: Any, make: Callable[[], Any]) -> Any:
-    """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
-
-    One result of each kind is kept: a factor of a large model fills most of the memory.
-    """
-    cache: dict[str, Any] = ctx.state.setdefault("factors", {})
-    parts = [*k.matrices, *k.conditions]
-    key = (node_store(ctx).version, extra, *(id(part) for part in parts))
-    found = cache.get(kind)
-    if found is None or found[0] != key:
-        cache.clear()
-        found = cache[kind] = key, parts, make()  # the parts stay alive, so that their ids are not used again
-    return found[2]
-
-
-def tell_notes(ctx: Context, solver: Factor) -> None:
-    """Warn about a slow package, or one that failed."""
-    for note in solver.notes:
-        ctx.warn("G201", "{note}", note=note)
 
 
 # -- conditions ------------------------------------------------------------------------------------------------------
@@ -80,9 +58,9 @@ def reduced(ctx: Context, system: System, imposed: FloatArray) -> Reduction:
 
 def _origins(system: System, rows: IntArray) -> list[str]:
     """Return what the user wrote for some rows of the conditions, each once."""
-    starts = np.cumsum([0, *(len(c.multipliers) for c in system.conditions)])
-    parts = np.unique(np.searchsorted(starts, rows, side="right") - 1)
-    return list(dict.fromkeys(system.conditions[int(p)].origin for p in parts))
+    wanted = system.multipliers[rows]
+    found = [c for c in system.conditions if np.isin(wanted, c.multipliers).any()]
+    return list(dict.fromkeys(c.origin for c in found))
 
 
 def _place(system: System, row: int) -> str:
@@ -91,32 +69,7 @@ def _place(system: System, row: int) -> str:
     return " ".join(f"{x:g}" for x in point)
 
 
-# -- free motions and singular systems -------------------------------------------------------------------------------
-
-
-def check_held(ctx: Context, system: System, contact_rows: Any = None) -> None:
-    """Fail with G404 when a solid can move as a rigid body, naming the motion."""
-    if system.names not in ELASTIC:
-        return
-    C = system.C if contact_rows is None else sp.vstack([system.C, contact_rows])
-    motions = free_motions(system.K, system.points, C)
-    if motions:
-        shown = "; ".join(_motion(m) for m in motions[:3]) + ("; ..." if len(motions) > 3 else "")
-        ctx.fail(
-            "G404",
-            "nothing stops {count} rigid motions: {motions}",
-            at="k",
-            count=len(motions),
-            motions=shown,
-            hint="hold the solid with BLOQ or SYMT, or join its contact conditions to the matrix",
-        )
-
-
-def _motion(motion: FreeMotion) -> str:
-    """Name a free motion and the solid that makes it, counted from 1."""
-    who = " and ".join(f"solid {i + 1}" for i in motion.solids)
-    centre = ", ".join(f"{x:g}" for x in motion.centre)
-    return f"{who}, centred at ({centre}): {motion.movement}"
+# -- singular systems ------------------------------------------------------------------------------------------------
 
 
 def singular(ctx: Context, system: System, failure: k_errors.SingularSystem, numbers: IntArray | None) -> NoReturn:
@@ -167,7 +120,7 @@ def solve_linear(
         return _factorised(ctx, system, reduction, choice(solutions), wish, precision)
 
     count = F.shape[1]
-    extra = "linear", wish, precision
+    extra = system.C.shape[0], wish, precision
     solver: _Solver = kept(ctx, "factor", k, extra, lambda: make(count))
     solver.solved += count
     if solver.choice.method != "auto" and choice(solver.solved).method == "auto":
