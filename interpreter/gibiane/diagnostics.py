@@ -21,6 +21,7 @@ LEVELS: dict[str, int] = {
     "G301": NOTE,
     "G411": NOTE,
     "G412": WARNING,
+    "G413": WARNING,
     "G900": FATAL,
 }
 G_CODES = {
@@ -42,6 +43,8 @@ G_CODES = {
     "G410": "prescribed error out of reach",
     "G411": "estimate not guaranteed",
     "G412": "no progress between passes",
+    "G413": "several contact solutions",
+    "G414": "too large for the memory",
     "G501": "file cut or of unknown format",
     "G900": "internal failure",
 }

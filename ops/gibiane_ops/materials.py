@@ -14,13 +14,23 @@ from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, MOT, POINT
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
+from gibiane_ops.values.contact import MAY_HAVE, NEEDS, RANGES
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import AXES, MATERIAL, MODULI, NEEDED, elastic_law
 from gibiane_ops.values.mechanics import corners
 from gibiane_ops.values.modele import Modele, ModelZone
-from gibiane_ops.values.nodes import FloatArray
+from gibiane_ops.values.nodes import FloatArray, IntArray
 
-CONTACT = {"MU": "friction coefficient", "COHE": "cohesion", "JEU": "initial gap, instead of the one of the geometry"}
+CONTACT = {
+    "MU": "friction coefficient",
+    "COHE": "cohesion, a stress",
+    "SEUI": "bound of Tresca's friction, a stress",
+    "KT": "stiffness of the elastic slip, stress over length",
+    "EXPO": "exponent of Norton-Hoff",
+    "VREF": "slip scale of Norton-Hoff",
+    "ADHE": "adhesion, a stress",
+    "JEU": "initial gap, instead of the one of the geometry",
+}
 COMMON = {
     "RHO": "mass density",
     "TREF": "temperature without thermal strain",
@@ -45,8 +55,11 @@ MATE = operator(
     "YG1 YG2 NU12 G12 in plane stress, YG3 NU13 NU23 too in the other plane modes, G13 G23 too in space; "
     "ALP1 ALP2 ALP3; the axes are those of space, or given by 'DIRECTION' V1 (V2 in space: the plane of the first "
     "two axes) or 'RADIAL' P1 (P2: an axis in space; the first direction leaves it), turned by 'INCLINE' A "
-    "degrees. Bars: YOUN, SECT (section). Contact: MU (friction coefficient), JEU (initial gap, instead of the "
-    "one of the geometry). A value is a number, or a CHPOINT or MCHAML, of which each element takes its mean.",
+    "degrees. Bars: YOUN, SECT (section). Contact: MU (friction coefficient), COHE (cohesion, added to MU times the "
+    "pressure), SEUI (Tresca's bound), KT (stiffness of the elastic slip), EXPO VREF (Norton-Hoff), ADHE (tension "
+    "that surfaces in contact withstand before they come off for good), JEU (initial gap, instead of the one of the "
+    "geometry): numbers, or CHPOINT on the slave surface. A value is a number, or a CHPOINT or MCHAML, of which each "
+    "element takes its mean.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 1 (0 0) (1 0)) TRAN 1 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ; LIST 'RESU' MA ;",
     see=["MODELISER", "RIGIDITE", "EPTH", "CARACTERISTIQUE"],
@@ -117,7 +130,7 @@ def _needed(zone: ModelZone) -> tuple[str, ...]:
 def _allowed(model: Modele) -> list[str]:
     """Return the names of properties that a model knows."""
     if model.contacts:
-        return list(CONTACT)
+        return list(dict.fromkeys(name for zone in model.contacts for name in (*NEEDS[zone.law], *MAY_HAVE[zone.law])))
     names: dict[str, str] = {}
     for zone in model.zones:
         names |= (ORTHOTROPIC if zone.orthotropic else ISOTROPIC) | (SECTION if zone.bars else {})
@@ -269,17 +282,46 @@ def _checked(ctx: Context, zone: ChamZone) -> ChamZone:
 
 
 def _contact_material(ctx: Context, model: Modele, given: dict[str, Any]) -> MChaml:
+    """Keep numbers as they are and fields at the nodes of the slave surface."""
     zones = []
-    for name, value in given.items():
-        if isinstance(value, ChPoint | MChaml):
-            ctx.fail(251, "a field for {name} is not available yet: give a number", at=name, name=name)
-        if name in ("MU", "COHE") and not value >= 0:
-            ctx.fail(41, "{name} = {value}: it cannot be negative", at=name, name=name, value=float(value))
-        if name == "COHE" and value:
-            ctx.fail(251, "cohesion is not available yet", at=name)
-    for pair in model.contacts:
-        if pair.law == "COULOMB" and "MU" not in given:
-            ctx.fail(46, "the property MU is missing", hint="the friction coefficient: MATE MC 'MU' 0.2")
-        values = np.array([[[float(v) for v in given.values()]]]).reshape(1, 1, len(given))
-        zones.append(ChamZone(pair, list(given), values))
-    return MChaml(zones, MATERIAL, "GRAVITE")
+    for zone in model.contacts:
+        missing = [name for name in NEEDS[zone.law] if name not in given]
+        if missing:
+            ctx.fail(
+                46,
+                "the property {name} is missing",
+                name=missing[0],
+                meaning=CONTACT[missing[0]],
+                hint="{name}: {meaning}",
+            )
+        nodes = zone.slave.nodes if any(isinstance(v, ChPoint) for v in given.values()) else np.zeros(1, np.int64)
+        columns = [_contact_values(ctx, name, value, nodes) for name, value in given.items()]
+        values = np.stack(columns, axis=1) if columns else np.zeros((len(nodes), 0))
+        zones.append(ChamZone(zone, list(given), values[None]))
+    return MChaml(zones, MATERIAL, "NOEUD")
+
+
+def _contact_values(ctx: Context, name: str, value: Any, nodes: IntArray) -> FloatArray:
+    """Return a property of contact at nodes, in its range."""
+    if isinstance(value, MChaml):
+        ctx.fail(26, "{name} is a number or a CHPOINT on the slave surface", at=name, name=name)
+    if isinstance(value, ChPoint):
+        if len(value.names) != 1:
+            ctx.fail(26, "the field given for {name} has several components", at=name, name=name)
+        found = value.at(value.names[0], nodes)
+    else:
+        found = np.full(len(nodes), float(value))
+    low, strict, high = RANGES.get(name, (-np.inf, False, np.inf))
+    bad = ~((found > low) if strict else (found >= low)) | ~(found <= high)
+    if bad.any():
+        limit = f"above {low:g}" if strict else f"at least {low:g}"
+        ctx.fail(
+            41,
+            "{name} = {value}: the {what} is {limit}",
+            at=name,
+            name=name,
+            value=float(found[bad][0]),
+            what=CONTACT[name].split(",")[0],
+            limit=limit if np.isinf(high) else f"{limit} and at most {high:g}",
+        )
+    return found

@@ -10,8 +10,9 @@ from gibiane_ops.kernels.elements.table import SHAPES, shape
 from gibiane_ops.values.maillage import Block, Maillage
 from gibiane_ops.values.modele import ContactZone, Modele, ModelZone
 
-FORMULATIONS = ("MECANIQUE", "ELASTIQUE", "ISOTROPE", "ORTHOTROPE", "CONTACT", "UNILATERAL", "FROTTANT", "COULOMB")
-KINEMATICS = ("MESC", "SYME", "FAIB", "MORT", "NOEU")
+FORMULATIONS = ("MECANIQUE", "ELASTIQUE", "ISOTROPE", "ORTHOTROPE", "CONTACT", "UNILATERAL", "FROTTANT")
+LAWS = ("COULOMB", "TRESCA", "REGULARISE", "NORTON")
+KINEMATICS = ("MESC", "SYME", "FAIB", "MORT", "NOEU", "RIGIDE")
 # Names of finite elements: that of the mesh is the default, and the only one that lines lack is BARR.
 ELEMENTS = ("BARR", *SHAPES)
 
@@ -26,7 +27,9 @@ MODE = operator(
     "'CONS' name is accepted. `MODE G1 G2 'CONTACT' 'FROTTANT' 'COULOMB'` (or 'UNILATERAL', "
     "without friction) makes a contact zone: G1 is the master surface, G2 the slave, facets with "
     "normals out of their solids; keywords and surfaces come in any order. Where the two surfaces "
-    "have coincident nodes, contact acts on pairs of nodes.",
+    "have coincident nodes, contact acts on pairs of nodes. Laws after 'FROTTANT': 'COULOMB' (MU, COHE), 'TRESCA' "
+    "(SEUI), 'REGULARISE' (MU, KT: elastic slip), 'NORTON' (MU, EXPO, VREF). 'RIGIDE': G1 is an obstacle that "
+    "belongs to no solid; its nodes have no unknowns, and the nodes of G2 need not coincide with them.",
     example="OPTI DIME 3 ELEM CUB8 ; B = (DROI 1 (0 0 0) (1 0 0)) TRAN 1 (0 1 0) ;\n"
     "V = B VOLU 1 'TRAN' (0 0 1) ; MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ; LIST 'RESU' MO ;",
     see=["MATERIAU", "RIGIDITE"],
@@ -35,11 +38,12 @@ MODE = operator(
 
 @MODE.stream(
     Key(FORMULATIONS, "formulation and law", name="law"),
-    Key(KINEMATICS, "kinematics of contact", name="kine"),
+    Key(LAWS, "law of friction", name="friction"),
+    Key(KINEMATICS, "kinematics of contact, or a rigid obstacle", name="kine"),
     Key(ELEMENTS, "finite element", name="element"),
     Key("CONS", "name of the part", Arg("part", MOT)),
     syntax="g:MAILLAGE (g2:MAILLAGE) 'MECANIQUE' ('ELASTIQUE' ('ISOTROPE'|'ORTHOTROPE')) ('BARR') | 'CONTACT' "
-    "('UNILATERAL'|'FROTTANT' 'COULOMB') ('MESC'|'NOEU')",
+    "('UNILATERAL'|'FROTTANT' 'COULOMB'|'TRESCA'|'REGULARISE'|'NORTON') ('MESC'|'NOEU') ('RIGIDE')",
     gives=[MMODEL],
 )
 def _mode(ctx: Context, q: Operands) -> Modele:
@@ -52,7 +56,7 @@ def _mode(ctx: Context, q: Operands) -> Modele:
             ctx.places[f"mesh {len(meshes) + 1}"] = at
             meshes.append(mesh)
             continue
-        word = q.read_keyword([*FORMULATIONS, *KINEMATICS, *ELEMENTS, "CONS"])
+        word = q.read_keyword([*FORMULATIONS, *LAWS, *KINEMATICS, *ELEMENTS, "CONS"])
         if word is None:
             break
         if word == "CONS":
@@ -60,7 +64,7 @@ def _mode(ctx: Context, q: Operands) -> Modele:
         words.append(word)
     i = q.first_word()
     if (i >= 0 and isinstance(q.values[i], str) and not q.is_operator_word(i)) or not words:
-        raise q.unknown_keyword([*FORMULATIONS, *KINEMATICS, *ELEMENTS, "CONS"])
+        raise q.unknown_keyword([*FORMULATIONS, *LAWS, *KINEMATICS, *ELEMENTS, "CONS"])
     if "CONTACT" in words:
         return _contact_model(ctx, q, meshes, words)
     if "MECANIQUE" not in words:
@@ -130,5 +134,9 @@ def _contact_model(ctx: Context, q: Operands, meshes: list[Maillage], words: lis
                 shapes=", ".join(wrong) or "nothing",
                 hint="FACE, ENVE or CONT give the facets of a solid",
             )
-    kinematics = next((w for w in words if w in KINEMATICS), "MESC")
-    return Modele([], [ContactZone(master, slave, "COULOMB" if "FROTTANT" in words else "UNILATERAL", kinematics)])
+    kinematics = next((w for w in words if w in KINEMATICS and w != "RIGIDE"), "MESC")
+    named = next((w for w in words if w in LAWS), None)
+    if named is not None and "FROTTANT" not in words:
+        ctx.fail(7, "{law} is a law of friction: 'FROTTANT' is missing", law=named, hint="'CONTACT' 'FROTTANT' '{law}'")
+    law = (named or "COULOMB") if "FROTTANT" in words else "UNILATERAL"
+    return Modele([], [ContactZone(master, slave, law, kinematics, "RIGIDE" in words)])

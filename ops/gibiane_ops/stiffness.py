@@ -10,12 +10,12 @@ from gibiane.forms import Arg
 from gibiane.registry import Context, extend, operator
 from gibiane.values import MCHAML, MMODEL, RIGIDITE
 from gibiane_ops.kernels import assembly
-from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs
 from gibiane_ops.values import mechanics
 from gibiane_ops.values.champs import ChPoint, MChaml
+from gibiane_ops.values.contact import NEEDS, nodal_property, warn_unpaired, zone_friction, zone_pairs
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
-from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, ContactZone, Modele
+from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.rigidite import ContactPart, MatrixPart, Rigidite
 
@@ -63,44 +63,19 @@ def _contact(ctx: Context, model: Modele, material: MChaml | None) -> Any:
     gaps: list[tuple[Any, FloatArray]] = []
     for zone in model.contacts:
         values = material.zone_of(zone) if material is not None else None
-        if zone.law == "COULOMB" and values is None:
-            raise ctx.operands.missing(MCHAML, "the friction coefficient (MATE MC 'MU' ...)")
-        pairs = _pairs(ctx, zone)
-        gap = pairs.gap
-        if values is not None and "JEU" in values.names:
-            gap = np.full(len(pairs.pairs), values.component("JEU")[0, 0])
-        mu = values.component("MU")[0, 0] if values is not None and zone.law == "COULOMB" else 0.0
+        if NEEDS[zone.law] and values is None:
+            raise ctx.operands.missing(MCHAML, f"the material of the contact (MATE MC '{NEEDS[zone.law][0]}' ...)")
+        pairs = zone_pairs(ctx, zone, at="model")
+        warn_unpaired(ctx, zone, pairs, at="model")
+        nodes = pairs.pairs[:, 0]
+        gap = nodal_property(ctx, values, "JEU", nodes)
         multipliers = store.add(pairs.points)
-        parts.append(ContactPart(zone, pairs, np.full(len(pairs.pairs), mu), multipliers))
-        gaps.append((multipliers, gap))
+        with worded(ctx, at="material"):
+            parts.append(ContactPart(zone, pairs, zone_friction(ctx, zone, values, nodes), multipliers))
+        gaps.append((multipliers, pairs.gap if gap is None else gap))
     nodes = np.concatenate([n for n, _ in gaps])
     values_of_gaps = np.concatenate([g for _, g in gaps])
     return Rigidite(parts), ChPoint(store, {"FLX": (nodes, values_of_gaps)}, "DISCRET")
-
-
-def _pairs(ctx: Context, zone: ContactZone) -> ContactPairs:
-    store = node_store(ctx)
-    dim = int(ctx.option("DIME"))
-    with worded(ctx, at="model"):
-        pairs = node_pairs(store.coords[:, :dim], zone.slave.kernel_blocks, zone.master.kernel_blocks)
-    if len(pairs.not_facing):
-        ctx.fail(
-            "G402",
-            "the surfaces do not face each other: their normals point the same way at {count} of {total} pairs",
-            at="model",
-            count=len(pairs.not_facing),
-            total=len(pairs.pairs),
-            hint="facets turn so that normals leave their solid: take them with FACE or ENVE, or turn one with ORIE",
-        )
-    smaller = min(len(pairs.unpaired_slave), len(pairs.unpaired_master))
-    if smaller:
-        ctx.warn(
-            "G401",
-            "{count} nodes of the smaller surface have no partner and stay free of contact",
-            at="model",
-            count=smaller,
-        )
-    return pairs
 
 
 UNION = extend("ET")

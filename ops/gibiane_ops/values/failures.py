@@ -73,5 +73,24 @@ def worded(ctx: Context, *, at: str | None = None) -> Iterator[None]:
             reason=failure.reason,
             hint="do the two surfaces touch, and is the first the master, the second the slave?",
         )
+    except k.UnsupportedLaw as failure:
+        ctx.fail(
+            251,
+            "{method} treats {known} only",
+            at=at,
+            method=failure.method,
+            known=failure.known,
+            hint="the default method 'NEWT' treats every law",
+        )
+    except k.TooLarge as failure:
+        ctx.fail(
+            "G414",
+            "{what} would need {needed} of memory, the limit is {limit}",
+            at=at,
+            what=failure.what,
+            needed=f"{failure.needed / 1e9:.3g} GB",
+            limit=f"{failure.limit / 1e9:.3g} GB",
+            hint="coarsen the contact surfaces, or model a half or a quarter of a symmetric scene",
+        )
     except k.MeshingFailed as failure:
         ctx.fail(27, "the mesher failed: {reason}", at=at, reason=failure.reason)

@@ -100,16 +100,19 @@ class ContactZone:
     master, slave : Maillage
         First and second surface (GEO1, GEO2); no slave node may cross a master facet. The slave belongs to body 1.
     law : str
-        UNILATERAL (no friction) or COULOMB.
+        UNILATERAL (no friction), COULOMB, TRESCA, REGULARISE (elastic slip) or NORTON.
     kinematics : str
         MESC, SYME, FAIB, MORT or NOEU; all are node pairs where nodes coincide.
+    rigid : bool
+        The master is an obstacle that belongs to no solid and has no unknowns.
     """
 
-    def __init__(self, master: Maillage, slave: Maillage, law: str, kinematics: str) -> None:
+    def __init__(self, master: Maillage, slave: Maillage, law: str, kinematics: str, rigid: bool = False) -> None:
         self.master = master
         self.slave = slave
         self.law = law
         self.kinematics = kinematics
+        self.rigid = rigid
 
 
 class Modele(Value):

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane.values import RIGIDITE, Value
+from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.modele import ContactZone
@@ -90,15 +91,15 @@ class ContactPart:
     zone : ContactZone
     pairs : ContactPairs
         With nodes of the session; the gap used is the one of the second member (FLX on `multipliers`).
-    mu : (n_pairs,) float64
-        Friction coefficients, 0 without friction.
+    law : Friction
+        Friction of the pairs, in nodal forces.
     multipliers : (n_pairs,) int64
     """
 
-    def __init__(self, zone: ContactZone, pairs: ContactPairs, mu: FloatArray, multipliers: IntArray) -> None:
+    def __init__(self, zone: ContactZone, pairs: ContactPairs, law: Friction, multipliers: IntArray) -> None:
         self.zone = zone
         self.pairs = pairs
-        self.mu = mu
+        self.law = law
         self.multipliers = multipliers
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane.registry import Context
-from gibiane_ops.kernels.contact.pairs import ContactPairs, joined
+from gibiane_ops.kernels.contact.law import Friction, friction, joined_laws
+from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, no_pairs
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore, node_store
 from gibiane_ops.values.rigidite import ConditionPart, ContactPart, Rigidite
@@ -32,6 +33,11 @@ class System:
     contacts : list of ContactPart
     multipliers : (m,) int64
         Node of the session that carries the value and the multiplier of each row of C.
+    stops : (k, n d) csr_array
+        Unilateral conditions, each turned so that it reads `row . u <= value`.
+    stop_multipliers : (k,) int64
+    stop_signs : (k,) float64
+        1 for MAXI, -1 for MINI: the rows, and the values of the load, are multiplied by it.
     """
 
     store: NodeStore
@@ -43,6 +49,9 @@ class System:
     conditions: list[ConditionPart]
     contacts: list[ContactPart]
     multipliers: IntArray
+    stops: sp.csr_array
+    stop_multipliers: IntArray
+    stop_signs: FloatArray
 
     @property
     def dim(self) -> int:
@@ -61,7 +70,7 @@ class System:
         """
         F = np.zeros(len(self.nodes) * self.dim)
         imposed = np.zeros(len(self.multipliers))
-        own = np.concatenate([self.multipliers, *(part.multipliers for part in self.contacts)])
+        own = np.concatenate([self.multipliers, self.stop_multipliers, *(part.multipliers for part in self.contacts)])
         for name, (nodes, values) in field.parts.items():
             if name == "FLX":
                 imposed = field.at("FLX", self.multipliers)
@@ -106,17 +115,37 @@ class System:
         for part in self.contacts:
             in_load = "FLX" in field.names and np.isin(part.multipliers, field.parts["FLX"][0]).all()
             found.append(field.at("FLX", part.multipliers) if in_load else part.pairs.gap)
-        return np.concatenate(found)
+        return np.concatenate([np.zeros(0), *found])
 
-    def pairs(self, gap: FloatArray) -> ContactPairs:
-        """Return the pairs of all contact zones in the compact numbering, with these gaps."""
-        whole = joined([part.pairs for part in self.contacts])
-        ids = self.store.canonical(whole.pairs)
-        return replace(whole, pairs=np.searchsorted(self.nodes, ids), gap=gap)
+    def pairs(self, ctx: Context, gap: FloatArray) -> ContactPairs:
+        """Return the pairs of all contact zones in the compact numbering, with these gaps; -1 stays the obstacle.
 
-    def friction(self) -> FloatArray:
-        """Return the friction coefficient of every pair."""
-        return np.concatenate([part.mu for part in self.contacts])
+        Fails with error 53 when a surface belongs to no solid of the matrix.
+        """
+        whole = joined([part.pairs for part in self.contacts]) if self.contacts else no_pairs(self.dim)
+        wanted = self.store.canonical(np.maximum(whole.pairs, 0))
+        ids = np.minimum(np.searchsorted(self.nodes, wanted), len(self.nodes) - 1)
+        lost = (self.nodes[ids] != wanted) & (whole.pairs >= 0)
+        if lost.any():
+            first = whole.points[np.flatnonzero(lost.any(axis=1))[0]]
+            ctx.fail(
+                53,
+                "{count} contact nodes have no stiffness, the first at ({where})",
+                at="k",
+                count=int(lost.sum()),
+                where=" ".join(f"{x:g}" for x in first),
+                hint="join the stiffness of both solids; a surface that belongs to no solid is 'RIGIDE'",
+            )
+        return replace(whole, pairs=np.where(whole.pairs < 0, -1, ids), gap=gap)
+
+    def friction(self) -> Friction:
+        """Return the law of every pair, and no friction for the stops."""
+        stops = friction(len(self.stop_signs))
+        return joined_laws([*(part.law for part in self.contacts), stops])
+
+    def stop_values(self, field: ChPoint) -> FloatArray:
+        """Return the values of the stops, zero where the second member has none."""
+        return self.stop_signs * field.at("FLX", self.stop_multipliers)
 
     def field(self, u: FloatArray, multipliers: FloatArray) -> ChPoint:
         """Return the solution as a field: the unknowns on the nodes, LX on the multiplier nodes."""
@@ -127,8 +156,11 @@ class System:
         return ChPoint(self.store, parts, DIFFUS)
 
 
-def build(ctx: Context, rigidity: Rigidite) -> System:
-    """Give numbers to the unknowns of a RIGIDITE and gather its matrices and conditions."""
+def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> System:
+    """Give numbers to the unknowns of a RIGIDITE and gather its matrices and conditions.
+
+    Conditions with MINI or MAXI become stops, or equalities when `bilateral`.
+    """
     store = node_store(ctx)
     if not rigidity.matrices:
         ctx.fail(26, "there is no stiffness among these conditions", at="k", hint="RIGI makes it from a model")
@@ -144,7 +176,7 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
         whole = len(place) == size and bool((np.diff(place) == 1).all())
         matrix = part.matrix if whole else _renumbered(part.matrix, place, size)
         K = K + matrix if number else matrix
-    rows, cols, data, multipliers = [], [], [], []
+    rows, cols, data, multipliers, signs = [], [], [], [], []
     start = 0
     conditions = _applicable(ctx, rigidity.conditions, names)
     for condition in conditions:
@@ -177,6 +209,8 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
         cols.append(place * len(names) + column)
         data.append(condition.coefficients)
         multipliers.append(condition.multipliers)
+        turned = 0.0 if bilateral else {"=": 0.0, "<": 1.0, ">": -1.0}[condition.sense]
+        signs.append(np.full(len(condition.multipliers), turned))
         start += len(condition.multipliers)
     empty_ids = np.zeros(0, np.int64)
     C = sp.csr_array(
@@ -186,16 +220,22 @@ def build(ctx: Context, rigidity: Rigidite) -> System:
         ),
         shape=(start, size),
     )
+    sign = np.concatenate([np.zeros(0), *signs])
+    carriers = np.concatenate([empty_ids, *multipliers])
+    equal, stop = np.flatnonzero(sign == 0), np.flatnonzero(sign)
     return System(
         store,
         nodes,
         names,
         duals,
         K,
-        C,
+        C[equal],
         conditions,
         rigidity.contacts,
-        np.concatenate([empty_ids, *multipliers]),
+        carriers[equal],
+        sp.csr_array(sp.diags_array(sign[stop]) @ C[stop]) if len(stop) else C[stop],
+        carriers[stop],
+        sign[stop],
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -234,6 +235,28 @@ def friction(
         slip_scale=_column(n, "slip scale", slip_scale, "a finite slip scale > 0", low=TINY),
         adhesion=_column(n, "adhesion", adhesion, "a finite adhesion >= 0", low=0.0),
         when_open=when_open,
+    )
+
+
+def joined_laws(laws: Sequence[Friction]) -> Friction:
+    """Put the laws of several sets of pairs one after the other.
+
+    Parameters
+    ----------
+    laws : sequence of Friction
+
+    Returns
+    -------
+    Friction
+    """
+    return Friction(
+        mu=np.concatenate([law.mu for law in laws]),
+        cohesion=np.concatenate([law.cohesion for law in laws]),
+        slip_stiffness=np.concatenate([law.slip_stiffness for law in laws]),
+        exponent=np.concatenate([law.exponent for law in laws]),
+        slip_scale=np.concatenate([law.slip_scale for law in laws]),
+        adhesion=np.concatenate([law.adhesion for law in laws]),
+        when_open=any(law.when_open for law in laws),
     )
 
 

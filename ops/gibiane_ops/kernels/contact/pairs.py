@@ -122,6 +122,21 @@ def node_pairs(
     )
 
 
+def no_pairs(dim: int) -> ContactPairs:
+    """Make a contact without any pair.
+
+    Parameters
+    ----------
+    dim : int
+
+    Returns
+    -------
+    ContactPairs
+    """
+    none, empty = np.zeros(0, np.int64), np.zeros((0, dim))
+    return ContactPairs(np.zeros((0, 2), np.int64), empty, np.zeros(0), empty, none, none, none, none, none)
+
+
 def joined(zones: Sequence[ContactPairs]) -> ContactPairs:
     """Put the pairs of several zones together.
 

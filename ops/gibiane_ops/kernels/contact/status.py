@@ -25,6 +25,7 @@ def solve_statuses(
     *,
     tolerance: float = 1e-4,
     closing_distance: float | None = None,
+    sticking_distance: float | None = None,
     max_iter: int = 100,
 ) -> ContactState:
     """Solve contact with friction by the fixed point on statuses.
@@ -38,6 +39,9 @@ def solve_statuses(
         Largest relative change of the largest tangential force.
     closing_distance : float, optional
         Penetration from which an open pair closes, a length; 5 % of ``interface.length_scale`` when left out.
+    sticking_distance : float, optional
+        Second variant: pairs below their bound are held, and a sliding pair sticks again when its slip is below this
+        length. When left out, no pair is held tangentially.
     max_iter : int
         Solutions of the normal contact problem.
 
@@ -64,8 +68,9 @@ def solve_statuses(
     the current r_n (always from r0); solve with G imposed and ``w_n = gap`` on closed pairs; a closed pair whose r_n is
     a tension opens, an open one whose penetration exceeds ``closing_distance`` closes. Bodies being held along the
     normals only, the tangential rigid motions take their smallest norm. The reaction of the result is (r_n, G), G being
-    cut at the r_n of the iteration before. The criterion looks at the largest force only: where that one is not cut,
-    smaller ones may stay beyond their bound, see ``report.excess_friction``.
+    cut at the r_n of the iteration before. The variant with ``sticking_distance`` holds sticking pairs and imposes G on
+    sliding ones only; it cycles where the distance is of the order of the slip. The criterion looks at the largest
+    force only: where that one is not cut, smaller ones may stay beyond their bound, see ``report.excess_friction``.
 
     Source
     ------
@@ -82,8 +87,10 @@ def solve_statuses(
     closing = 0.05 * interface.length_scale if closing_distance is None else closing_distance
     tied = np.where(interface.active, -interface.f.reshape(n, d), 0.0)
     closed = interface.active[:, 0] & (tied[:, 0] <= 0)
+    holding = sticking_distance is not None
     G = _cut(tied, tied[:, 0], law, closed)
-    normal = _NormalContact(interface, closed)
+    stuck = closed & (norms(G) >= norms(tied[:, 1:])) & holding
+    normal = _NormalContact(interface, closed, stuck)
     history: list[float] = []
     seen: list[IntArray] = []
     for _ in range(max_iter):
@@ -92,29 +99,36 @@ def solve_statuses(
         closes = interface.active[:, 0] & ~closed & (w[:, 0] > interface.gap + closing)
         new_closed = (closed & ~opens) | closes
         new_G = _cut(tied, r[:, 0], law, new_closed)
+        new_stuck = stuck
+        if sticking_distance is not None:
+            slips = stuck & (norms(r[:, 1:]) > law.bound(r[:, 0]))
+            sticks = ~stuck & (norms(w[:, 1:]) < sticking_distance)
+            new_stuck = new_closed & ((stuck & ~slips) | sticks)
         largest = float(norms(new_G).max(initial=0))
         change = abs(largest - float(norms(G).max(initial=0)))
         history.append(change / largest if largest else change)
-        state = check_state(interface, w, r, _statuses(closed, tied, G), law, history, None)
-        if not (opens | closes).any():
+        statuses = np.where(closed, np.where(stuck, STICK, SLIP), OPEN) if holding else _statuses(closed, tied, G)
+        state = check_state(interface, w, r, statuses, law, history, None)
+        if not ((new_closed != closed) | (new_stuck != stuck)).any():
             if change <= tolerance * largest:
                 return state
         else:
-            _raise_if_cycling(seen, new_closed, history, state)
-            normal = _NormalContact(interface, new_closed)
-        closed, G = new_closed, new_G
+            _raise_if_cycling(seen, new_closed, new_stuck, history, state)
+            normal = _NormalContact(interface, new_closed, new_stuck)
+        closed, stuck, G = new_closed, new_stuck, new_G
     raise NotConverged(history, state)
 
 
 class _NormalContact:
-    """Normal contact on given closed pairs, with given tangential forces."""
+    """Normal contact on given closed pairs, with given tangential forces on those that are not stuck."""
 
-    def __init__(self, interface: Interface, closed: BoolArray) -> None:
+    def __init__(self, interface: Interface, closed: BoolArray, stuck: BoolArray) -> None:
         from scipy.linalg import cho_factor
 
         self.interface = interface
         self.known = np.zeros((interface.n_pairs, interface.dim), dtype=bool)
         self.known[:, 0] = closed
+        self.known[:, 1:] = stuck[:, None]
         free = ~self.known.ravel()
         self.drift = self._drifts(free)
         A = interface.S[np.ix_(free, free)] + interface.kref * self.drift @ self.drift.T
@@ -127,14 +141,14 @@ class _NormalContact:
         S, f = self.interface.S, self.interface.f
         free = ~self.known.ravel()
         w = np.where(self.known[:, 0], self.interface.gap, 0.0)[:, None] * np.eye(self.interface.dim)[0]
-        r = np.column_stack([np.zeros(len(w)), G])
+        r = np.column_stack([np.zeros(len(w)), np.where(self.known[:, 1:], 0.0, G)])
         flat = w.ravel()
         right = (f + r.ravel())[free] - S[np.ix_(free, ~free)] @ flat[~free]
         # what the drifts cannot balance has no answer: the smallest motion leaves it out
         right -= self.drift @ (self.drift.T @ right)
         flat[free] = cho_solve(self.factor, right)
         w = flat.reshape(w.shape)
-        r[:, 0] = np.where(self.known[:, 0], (S @ flat - f).reshape(w.shape)[:, 0], 0.0)
+        r = np.where(self.known, (S @ flat - f).reshape(w.shape), r)
         return w, r
 
     def _drifts(self, free: BoolArray) -> FloatArray:
@@ -160,12 +174,13 @@ def _statuses(closed: BoolArray, tied: FloatArray, G: FloatArray) -> IntArray:
     return np.where(closed, np.where(cut, SLIP, STICK), OPEN)
 
 
-def _raise_if_cycling(seen: list[IntArray], closed: BoolArray, history: list[float], state: ContactState) -> None:
-    """Compare the closed pairs with all earlier ones; twice may be a detour, three times is a cycle."""
-    now = np.flatnonzero(closed)
+def _raise_if_cycling(
+    seen: list[IntArray], closed: BoolArray, stuck: BoolArray, history: list[float], state: ContactState
+) -> None:
+    """Compare the statuses with all earlier ones; twice may be a detour, three times is a cycle."""
+    now = closed.astype(np.int64) + stuck
     before = [i for i, old in enumerate(seen) if np.array_equal(old, now)]
     seen.append(now)
     if len(before) >= 2:
-        union = np.unique(np.concatenate(seen[before[-1] :]))
-        common = [i for i in union if all(i in old for old in seen[before[-1] :])]
-        raise StatusCycle(len(seen) - 1 - before[-1], np.setdiff1d(union, common), history, state)
+        loop = np.stack(seen[before[-1] :])
+        raise StatusCycle(len(seen) - 1 - before[-1], np.flatnonzero(np.ptp(loop, axis=0)), history, state)

@@ -1,0 +1,327 @@
+"""A contact problem of RESO: from the system to the interface, through a method, to the field and its report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+import scipy.sparse as sp
+
+from gibiane.registry import Context
+from gibiane.values import Table
+from gibiane_ops.kernels import errors as k_errors
+from gibiane_ops.kernels.constraints import reduce_conditions
+from gibiane_ops.kernels.contact.condense import Condensation, condense
+from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.law import Friction
+from gibiane_ops.kernels.contact.newton import solve_tied
+from gibiane_ops.kernels.contact.pairs import facets_of_body
+from gibiane_ops.kernels.contact.report import STICK, ContactState, check_state
+from gibiane_ops.kernels.contact.uniqueness import compare_starts
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.geometry import facet_normals
+from gibiane_ops.values.champs import ChPoint
+from gibiane_ops.values.failures import worded
+from gibiane_ops.values.methods import Method
+from gibiane_ops.values.nodes import FloatArray, IntArray
+from gibiane_ops.values.rapport import fill_report, success
+from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.solving import check_held, kept, tell_notes
+from gibiane_ops.values.system import System
+
+FORCES = ("LFX", "LFY", "LFZ")
+
+
+@dataclass(frozen=True, eq=False)
+class Wishes:
+    """What the user asked of a contact solution.
+
+    Attributes
+    ----------
+    method : Method
+    report : Table or None
+    history : ChPoint or None
+        Solution of the load step before.
+    start : ChPoint or None
+    lenient : bool
+        A failure to converge is a warning.
+    bonded : bool
+        Contact surfaces are tied.
+    compare : bool
+        Look for other solutions.
+    """
+
+    method: Method
+    report: Table | None
+    history: ChPoint | None
+    start: ChPoint | None
+    lenient: bool
+    bonded: bool
+    compare: bool
+
+
+def solve_contact(
+    ctx: Context,
+    k: Rigidite,
+    system: System,
+    field: ChPoint,
+    load: tuple[FloatArray, FloatArray],
+    wishes: Wishes,
+) -> ChPoint:
+    """Solve a system with contact conditions or stops; the field holds their forces beside the displacement."""
+    F, imposed = load
+    _check_normals(ctx, k, system)
+    pairs = system.pairs(ctx, system.gaps(field))
+    if (pairs.gap < 0).any():
+        worst = int(np.argmin(pairs.gap))
+        where = " ".join(f"{x:g}" for x in pairs.points[worst])
+        ctx.fail(
+            "G403",
+            "the solids penetrate each other at {count} nodes before any load, most at ({where}): {depth}",
+            at="k",
+            count=int((pairs.gap < 0).sum()),
+            where=where,
+            depth=f"{-pairs.gap[worst]:.3g}",
+            hint="move one solid, or give the gap: MATE MC 'JEU' 0.",
+        )
+    with worded(ctx, at="k"):
+        reduction = reduce_conditions(system.C, imposed)
+
+    def condensed() -> Condensation:
+        check_held(ctx, system, _held_rows(system, pairs.pairs))
+        try:
+            return condense(system.K, pairs, reduction, stops=system.stops)
+        except k_errors.SingularSystem as failure:
+            ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
+
+    with worded(ctx, at="k"):
+        condensation: Condensation = kept(
+            ctx, "contact", k, (pairs.pairs.tobytes(), pairs.normals.tobytes()), condensed
+        )
+        interface = condensation.interface(F, reduction.offset, system.stop_values(field), pairs.gap)
+    tell_notes(ctx, condensation.factor)
+    law = system.friction()
+    origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs.pairs, law, wishes.history)
+    start = None if wishes.start is None else _start(system, interface, pairs.pairs, law, wishes.start)
+    state = _run(ctx, system, interface, law, wishes, start, origin)
+    u = interface.expand(state.w)
+    n = len(pairs.pairs)
+    vector = interface.to_global(state.r)[:n]
+    on_stops = state.r[n:, 0]
+    forces = np.zeros_like(u).reshape(-1, system.dim)
+    np.add.at(forces, pairs.pairs[:, 0], vector)
+    solid = pairs.pairs[:, 1] >= 0
+    np.add.at(forces, pairs.pairs[solid, 1], -vector[solid])
+    total = F + forces.ravel() + system.stops.T @ on_stops
+    m = reduction.multipliers(reduction.reactions(system.K, u, total))
+    return _with_contact_forces(system, system.field(u, m), state, vector, on_stops)
+
+
+def _run(
+    ctx: Context,
+    system: System,
+    interface: Interface,
+    law: Friction,
+    wishes: Wishes,
+    start: ContactState | None,
+    origin: FloatArray | None,
+) -> ContactState:
+    """Run the method, look for other solutions if asked, and fill the report."""
+    method, converged, message = wishes.method, True, ""
+    try:
+        if wishes.bonded:
+            state = solve_tied(interface)
+        else:
+            with worded(ctx, at="k"):
+                state = method.solve(interface, law, start=start, slip_origin=origin)
+        message = success(method, state)
+    except (k_errors.NotConverged, k_errors.StatusCycle, k_errors.ContactUnbalanced) as failure:
+        best = failure.best
+        if not isinstance(best, ContactState):
+            raise
+        state, converged, message = best, False, _reason(failure, interface)
+        if not wishes.lenient:
+            if wishes.report is not None:
+                _report(wishes.report, system, method, interface, state, converged, message)
+            _fail(ctx, failure, message, method)
+        ctx.warn(1119, "contact has not converged: {reason}", reason=message, at="k")
+    if wishes.report is not None:
+        _report(wishes.report, system, method, interface, state, converged, message)
+    if wishes.compare and converged:
+        # an approximate method may be far from every solution: the exact one is what is unique or not
+        exact = method.solve_exact(interface, law, origin) if method.approximate else state
+        found = compare_starts(interface, law, exact, slip_origin=origin)
+        if wishes.report is not None:
+            wishes.report.set("UNIQUE", found.unique)
+        if not found.unique:
+            ctx.warn(
+                "G413",
+                "other solutions exist: another start of the iterations leads to forces that differ by {share} of the "
+                "largest",
+                at="k",
+                share=f"{found.difference:.2g}",
+                hint="large friction coefficients allow several equilibria; the one returned is that of the method",
+            )
+    return state
+
+
+def _report(
+    table: Table, system: System, method: Method, interface: Interface, state: ContactState, converged: bool, text: str
+) -> None:
+    counts = [len(part.multipliers) for part in system.contacts]
+    fill_report(table, method, interface, state, converged, text, counts)
+
+
+def _relative(system: System, interface: Interface, pairs: IntArray, u: ChPoint) -> FloatArray:
+    """Return u1 - u2 of the pairs and the values of the stops, in local axes."""
+    table = u.table(system.names, system.nodes)
+    moved = table[pairs[:, 0]] - np.where(pairs[:, 1:] >= 0, table[pairs[:, 1]], 0.0)
+    n = len(pairs)
+    w = np.zeros(interface.active.shape)
+    w[:n] = np.einsum("nij,nj->ni", interface.frames[:n], moved)
+    w[n:, 0] = system.stops @ table.ravel()
+    return np.where(interface.active, w, 0.0)
+
+
+def _forces(system: System, interface: Interface, u: ChPoint) -> FloatArray | None:
+    """Return the contact forces that a solution holds, in local axes; None when it is of other conditions."""
+    nodes = np.concatenate([np.zeros(0, np.int64), *(part.multipliers for part in system.contacts)])
+    names = FORCES[: system.dim]
+    if not all(name in u.names and np.isin(nodes, u.parts[name][0]).all() for name in names):
+        return None
+    r = np.zeros(interface.active.shape)
+    r[: len(nodes)] = np.einsum("nij,nj->ni", interface.frames[: len(nodes)], u.table(names, nodes))
+    r[len(nodes) :, 0] = system.stop_signs * u.at("LX", system.stop_multipliers)
+    return r
+
+
+def _slip_origin(
+    ctx: Context, system: System, interface: Interface, pairs: IntArray, law: Friction, before: ChPoint
+) -> FloatArray:
+    """Return the slips at the end of the load step before, without their elastic part."""
+    w = _relative(system, interface, pairs, before)
+    if not law.is_elastic:
+        return w[:, 1:]
+    r = _forces(system, interface, before)
+    if r is None:
+        ctx.fail(
+            21,
+            "the solution given by 'HIST' holds no forces of these contact conditions, which elastic slip needs",
+            at="hist",
+            hint="keep one result of RIGI MC MATC for all load steps",
+        )
+    return law.slip_of(w[:, 1:], r[:, 1:])
+
+
+def _start(system: System, interface: Interface, pairs: IntArray, law: Friction, u: ChPoint) -> ContactState:
+    """Make a first guess of a solution; forces that it does not hold are those of equilibrium."""
+    w = _relative(system, interface, pairs, u)
+    r = _forces(system, interface, u)
+    if r is None:
+        r = np.where(interface.active, (interface.S @ w.ravel() - interface.f).reshape(w.shape), 0.0)
+    return check_state(interface, w, r, np.full(len(w), STICK), law, [], None)
+
+
+def _held_rows(system: System, pairs: IntArray) -> sp.csr_array:
+    """Write the relative displacements of the pairs and the stops as rows."""
+    n, d = len(pairs), system.dim
+    row = np.repeat(np.arange(n * d), 2)
+    slave = pairs[:, :1] * d + np.arange(d)
+    master = np.maximum(pairs[:, 1:], 0) * d + np.arange(d)
+    column = np.stack([slave.ravel(), master.ravel()], axis=1).ravel()
+    value = np.stack([np.ones(n * d), np.repeat(np.where(pairs[:, 1] >= 0, -1.0, 0.0), d)], axis=1).ravel()
+    tied = sp.csr_array((value, (row, column)), shape=(n * d, system.K.shape[0]))
+    return sp.csr_array(sp.vstack([tied, system.stops], format="csr"))
+
+
+def _check_normals(ctx: Context, k: Rigidite, system: System) -> None:
+    """Fail with G402 when the normals of a slave surface point into its own solid."""
+    blocks = [b for part in k.matrices if part.mesh is not None for b in part.mesh.kernel_blocks]
+    points = system.store.coords[:, : system.dim]
+    for part in system.contacts:
+        for name, cells in part.zone.slave.kernel_blocks:
+            try:
+                turned = facets_of_body(blocks, [(name, cells)])[0][1]
+            except k_errors.EmptyContact:
+                continue
+            given, outward = (facet_normals(shape(name), points[c]) for c in (cells, turned))
+            wrong = int((np.einsum("mi,mi->m", given, outward) < 0).sum())
+            if wrong:
+                ctx.fail(
+                    "G402",
+                    "the normals of {count} facets of the slave surface point into their solid",
+                    at="k",
+                    count=wrong,
+                    hint="take the surface with FACE or ENVE, or turn it with ORIE or INVE",
+                )
+
+
+def _with_contact_forces(
+    system: System, u: ChPoint, state: ContactState, vector: FloatArray, on_stops: FloatArray
+) -> ChPoint:
+    nodes = np.concatenate([np.zeros(0, np.int64), *(part.multipliers for part in system.contacts)])
+    parts = dict(u.parts)
+    own, values = parts.get("LX", (np.zeros(0, np.int64), np.zeros(0)))
+    parts["LX"] = (
+        np.concatenate([own, nodes, system.stop_multipliers]),
+        np.concatenate([values, state.r[: len(nodes), 0], system.stop_signs * on_stops]),
+    )
+    if len(nodes):
+        parts |= {name: (nodes, vector[:, i]) for i, name in enumerate(FORCES[: system.dim])}
+    return ChPoint(system.store, parts, u.nature)
+
+
+def _reason(failure: Any, interface: Interface) -> str:
+    """Say why a method has failed, in terms of the model."""
+    if isinstance(failure, k_errors.ContactUnbalanced):
+        # a slide of the polar cone comes with an opening, which is no physical one
+        along_surface = np.r_[0.0, np.ones(interface.dim - 1)]
+        motion = failure.motion * along_surface if failure.kind == "sliding" else failure.motion
+        mean = interface.to_global(motion).mean(axis=0)
+        size = float(np.abs(mean).max())
+        along = " ".join(f"{x:.2g}" for x in np.round(mean / size, 3) + 0.0) if size > 0 else ""
+        where = f" towards ({along})" if along and failure.kind != "tipping" else ""
+        return f"{failure.share:.2%} of the load on the free motions is not balanced, {failure.kind}{where}"
+    if isinstance(failure, k_errors.StatusCycle):
+        return f"the statuses of {len(failure.pairs)} pairs come back every {failure.period} iterations"
+    last = ", ".join(f"{x:.2g}" for x in failure.history[-3:])
+    return f"{len(failure.history)} iterations, last residuals {last}"
+
+
+def _fail(ctx: Context, failure: Any, reason: str, method: Method) -> NoReturn:
+    if isinstance(failure, k_errors.ContactUnbalanced):
+        if failure.kind == "separation":
+            ctx.fail(
+                "G404",
+                "a solid is held only by contact that opens: {reason}",
+                at="k",
+                reason=reason,
+                hint="hold the solid, or reverse the load that lifts it",
+            )
+        ctx.fail(
+            "G405",
+            "contact cannot balance the load: {reason}",
+            at="k",
+            reason=reason,
+            hint="reduce the tangential load, raise MU, or hold the solid",
+        )
+    if isinstance(failure, k_errors.StatusCycle):
+        ctx.fail(
+            "G406",
+            "method '{method}' cycles: {reason}",
+            at="k",
+            method=method.title,
+            reason=reason,
+            hint="use the default method 'NEWT'",
+        )
+    ctx.fail(
+        1119,
+        "contact has not converged by '{method}': {reason}",
+        at="k",
+        method=method.title,
+        reason=reason,
+        hint="'RAPP' T keeps the history, 'SOUC' gives the best iterate"
+        if method.name == "NEWT"
+        else "the default method 'NEWT' needs no parameter; 'RAPP' T keeps the history, 'ITMA' n allows more iterations",
+    )
