@@ -173,6 +173,7 @@ def free_motions(K: sp.sparray, points: FloatArray, C: sp.sparray) -> list[FreeM
     centres, radii, modes = _solid_modes(points, solid, n_solids)
     seen = sp.csr_array(C) @ modes
     seen.eliminate_zeros()
+    gram = sp.csr_array(modes.T @ modes)
     rows, columns = seen.nonzero()
     links = sp.csr_array(
         (np.ones(len(rows)), (columns // n_modes, rows + n_solids)), shape=(n_solids + seen.shape[0],) * 2
@@ -183,7 +184,8 @@ def free_motions(K: sp.sparray, points: FloatArray, C: sp.sparray) -> list[FreeM
         members = np.flatnonzero(label[:n_solids] == name)
         unknowns = (members[:, None] * n_modes + np.arange(n_modes)).ravel()
         conditions = np.flatnonzero(label[n_solids:] == name)
-        basis = _readable(_null_space(seen[conditions][:, unknowns].toarray()), dim, n_modes)
+        stopped = [seen[conditions][:, unknowns].toarray(), _still(gram[unknowns][:, unknowns].toarray())]
+        basis = _readable(_null_space(np.concatenate(stopped)), dim, n_modes)
         for motion in basis.T.reshape(-1, len(members), n_modes):
             found.append(_describe(motion, members, solid, centres, radii))
     return sorted(found, key=lambda motion: (motion.solids, bool(motion.rotation.any())))
@@ -227,6 +229,12 @@ def _solid_modes(points: FloatArray, solid: IntArray, n_solids: int) -> tuple[Fl
     columns = solid[rows // dim, None] * n_modes + np.arange(n_modes)
     place = (np.repeat(rows, n_modes), columns.ravel())
     return centres, radii, sp.csr_array((modes[rows].ravel(), place), shape=(n * dim, n_solids * n_modes))
+
+
+def _still(gram: FloatArray) -> FloatArray:
+    """Return the combinations of modes that move no node, by rows: rotations of a bar about itself, of a point."""
+    values, vectors = np.linalg.eigh(gram)
+    return np.asarray(vectors[:, values <= SEEN**2 * values[-1]].T, np.float64)
 
 
 def _null_space(A: FloatArray) -> FloatArray:

@@ -64,7 +64,8 @@ def _shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[
             at=at,
             hint="the last operand is the vector: G PLUS (0. 0. 1.)",
         )
-    names = next((n for n in DISPLACEMENTS.values() if set(n) & set(by.names)), DISPLACEMENTS["TRID"])
+    # UZ is a name of two families, hence the largest number of names in common.
+    names = max(DISPLACEMENTS.values(), key=lambda family: len(set(family) & set(by.names)))
 
     def move(x: FloatArray, nodes: Any) -> FloatArray:
         result = x.copy()
