@@ -13,12 +13,11 @@ from gibiane.nodes import Node
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, LISTMOTS, MAILLAGE, MOT, POINT, RIGIDITE
 from gibiane_ops.values.champs import DISCRET, ChPoint
-from gibiane_ops.values.conditions import ROTATIONS, condition, directed, displacements, family, support
+from gibiane_ops.values.conditions import KNOWN, ROTATIONS, condition, directed, displacements, family, support
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 from gibiane_ops.values.rigidite import ConditionPart, Rigidite
 
-KNOWN = {"UX", "UY", "UZ", "UR", "UT", "RX", "RY", "RZ", "RT", "T"}
 SENSES = {"MINI": ">", "MAXI": "<"}
 _EXAMPLE = (
     "OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"

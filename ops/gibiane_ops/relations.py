@@ -16,7 +16,7 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.mesh.hosts import hosted
 from gibiane_ops.kernels.rigid import dependent_motion
 from gibiane_ops.values.champs import ChPoint
-from gibiane_ops.values.conditions import ROTATIONS, displacements, family, rows_of, support
+from gibiane_ops.values.conditions import KNOWN, ROTATIONS, displacements, family, rows_of, support
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.modele import Modele
@@ -24,7 +24,6 @@ from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 from gibiane_ops.values.rigidite import Rigidite
 
 SENSES = {"MINI": ">", "MAXI": "<"}
-OPTIONS = ("CORI", "ENSE", "ACCR", "GLIS", "MILI", "TUYA", "MINI", "MAXI")
 
 RELA = operator(
     "RELA",
@@ -315,8 +314,10 @@ def _term(ctx: Context, q: Operands, sign: float) -> _Term:
         if length == 0:
             ctx.fail(239, "the direction is null", at="name")
         weights = factor * vector[: len(names)] / length
-    elif not word.isalnum() or word in OPTIONS:
-        ctx.fail(197, "{word} is not the name of an unknown", at="name", word=word)
+    elif word not in KNOWN:
+        known = " ".join(displacements(ctx))
+        hint = "here the unknowns are {known}; 'DEPL' 'DIRECTION' V takes them along a vector"
+        ctx.fail(197, "{word} is not the name of an unknown", at="name", word=word, known=known, hint=hint)
     if place is None:
         place = q.need((MAILLAGE, POINT), "the nodes of the relation")
     nodes = place.nodes_in_order() if isinstance(place, Maillage) else np.array([place.node])

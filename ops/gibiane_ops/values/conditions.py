@@ -14,6 +14,7 @@ from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 from gibiane_ops.values.rigidite import ConditionPart, Rigidite
 
 ROTATIONS = {"TRID": ("RX", "RY", "RZ"), "PLAN": ("RZ",), "AXIS": ("RT",)}
+KNOWN = {"UX", "UY", "UZ", "UR", "UT", "RX", "RY", "RZ", "RT", "T", "P", "PI", "TH"}
 # What a term of a condition with a coefficient below this share of the largest is: round-off of a unit vector.
 NEGLIGIBLE = 1e-12
 

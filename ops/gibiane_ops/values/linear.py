@@ -23,6 +23,7 @@ from gibiane_ops.values.system import System
 ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
 ENERGY_LIMIT = 1e-6
 """Share of the energy that may be missing in ``u.K.u = u.(F + r)`` before a warning is due."""
+ROUND_OFF = 1e-13
 
 METHODS = {
     "rslab": "sparse LDLt (rslab)",
@@ -192,6 +193,8 @@ def _check_energy(ctx: Context, system: System, u: FloatArray, F: FloatArray, r:
     energy = np.einsum("ij,ij->j", u, system.K @ u)
     work = np.einsum("ij,ij->j", u, F + r)
     size = np.maximum(np.abs(energy), np.abs(work))
+    # A rigid motion has no energy but round-off, whose size that of the single springs tells.
+    size = np.maximum(size, ROUND_OFF / ENERGY_LIMIT * (system.K.diagonal() @ u**2))
     gap = np.divide(np.abs(energy - work), size, out=np.zeros_like(size), where=size > 0)
     if gap.max(initial=0.0) > ENERGY_LIMIT:
         ctx.warn(

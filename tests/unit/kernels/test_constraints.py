@@ -163,3 +163,27 @@ def test_long_chain_of_ties() -> None:
 def test_no_unknown_is_solved_for_through_a_small_coefficient() -> None:
     reduction = reduce_conditions(conditions({0: 1e-6, 1: 1}, {1: 1, 2: 1, 3: 1e-6}))
     assert np.abs(reduction.relation).max() <= 10.0
+
+
+@pytest.mark.parametrize(
+    "C",
+    [
+        conditions({0: 1.0}, {4: 2.0}, {5: 1.0}),
+        conditions({0: 1.0}, {3: 1.0, 1: -0.5, 2: -0.5}),
+        conditions({0: 1.0, 5: -1.0}, {1: 1.0, 4: 2.0}, {2: 3.0}),
+        conditions(),
+    ],
+)
+@pytest.mark.parametrize("block", [1, 2, 4])
+def test_the_whole_matrix_gives_the_same_solution(C: sp.csr_array, block: int) -> None:
+    K, F = system()
+    reduction = reduce_conditions(C, np.linspace(0.1, 0.3, C.shape[0]))
+    whole = reduction.whole_matrix(K, block)
+    assert whole.blocksize == (block, block)
+    b = np.zeros(len(F))
+    b[reduction.free] = reduction.load(K, F)
+    x = np.linalg.solve(whole.toarray(), b)
+    np.testing.assert_allclose(whole.toarray(), whole.toarray().T)
+    eliminated = np.setdiff1d(np.arange(len(F)), reduction.free)
+    np.testing.assert_array_equal(x[eliminated], 0)
+    np.testing.assert_allclose(reduction.expand(x[reduction.free]), solve(reduction, K, F), rtol=1e-11)

@@ -5,9 +5,10 @@ import pytest
 import scipy.sparse as sp
 
 from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels.bars import bar_stiffness
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic
-from gibiane_ops.kernels.rigid import FreeMotion, free_motions, rigid_modes
+from gibiane_ops.kernels.rigid import FreeMotion, dependent_motion, free_motions, rigid_modes
 
 CUBE = (shape("CUB8").ref_nodes + 1) / 2
 BOTTOM, TOP = [0, 1, 2, 3], [4, 5, 6, 7]
@@ -130,3 +131,36 @@ def test_plane_solid() -> None:
     (motion,) = free_motions(K, square, pinned)
     assert str(motion) == "solid 0: rotation about z through (-1, -1)"
     assert free_motions(K, square, rows(8, {0: 1.0}, {1: 1.0}, {3: 1.0})) == []
+
+
+@pytest.mark.parametrize(
+    ("points", "n_free"),
+    [
+        (np.random.default_rng(0).uniform(size=(7, 3)), 6),
+        (np.random.default_rng(0).uniform(size=(5, 2)), 3),
+        (np.outer(np.arange(4.0), [1.0, 2.0, 3.0]), 5),
+        (np.ones((3, 3)), 3),
+        (1e-6 * np.random.default_rng(0).uniform(size=(6, 3)) + 1e3, 6),
+    ],
+)
+def test_dependent_motion_holds_for_every_rigid_motion(points, n_free):
+    masters, followers, coefficients = dependent_motion(points)
+    assert len(masters) == n_free
+    np.testing.assert_array_equal(np.sort(np.r_[masters, followers]), np.arange(points.size))
+    modes = rigid_modes(points - points.mean(axis=0))
+    np.testing.assert_allclose(coefficients @ modes[masters], modes[followers], atol=1e-9 * np.abs(modes).max())
+    # a stretch is not a rigid motion
+    if n_free > 3:
+        stretch = (points - points.mean(axis=0)).ravel()
+        assert np.abs(coefficients @ stretch[masters] - stretch[followers]).max() > 0.1 * np.abs(stretch).max()
+
+
+def test_the_rotation_of_a_bar_about_itself_moves_nothing() -> None:
+    """A bar along x held across it and at one end: what is left turns no node."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    cells = np.array([[0, 1], [1, 2]])
+    Ke = bar_stiffness(shape("SEG2"), points[cells], np.array([[3.0]]))
+    K = assembly.assemble(3, 3, [(cells, Ke)])
+    assert free_motions(K, points, rows(9, *held([0, 1, 2], "yz"), *held([0], "x"))) == []
+    (slide,) = free_motions(K, points, rows(9, *held([0, 1, 2], "yz")))
+    assert str(slide) == "solid 0: translation along x"
