@@ -11,6 +11,7 @@ from gibiane_ops.kernels.arrays import strain_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import SHAPES
+from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.rigid import rigid_modes
 
@@ -203,3 +204,102 @@ def test_closed_boundary_under_pressure_is_in_balance(name: str) -> None:
 def test_volumes_fill_the_box(name: str) -> None:
     points, cells = box(name, (3, 2, 2)[: SHAPES[name].dim])
     assert geometry.measures(SHAPES[name], points[cells]).sum() == pytest.approx(12.0 if points.shape[1] == 3 else 6.0)
+
+
+PLANE = [name for name in NAMES if SHAPES[name].dim == 2]
+
+
+def meridian(name: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    points, cells = mesh(name, seed)
+    return points + [1.0, 0.0], cells
+
+
+@pytest.mark.parametrize("name", PLANE)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_axisymmetric_patch(name: str, seed: int) -> None:
+    """u_r = a r, u_z = b z prescribed on the boundary of a distorted section is found inside, with constant stress."""
+    points, cells = meridian(name, seed)
+    each, D, a, b = SHAPES[name], isotropic(E, NU, "AXIS"), 1.3, -0.7
+    exact = points * [a, b]
+    skin = np.unique(np.concatenate([f.nodes.ravel() for f in topology.boundary([(name, cells)]).values()]))
+    K = assembly.assemble(
+        len(points), 2, [(cells, assembly.element_stiffness(each, points[cells], D, axisymmetric=True))]
+    )
+    reduction = reduce_conditions(fixed((skin[:, None] * 2 + [0, 1]).ravel(), points.size), exact[skin].ravel())
+    load = reduction.load(K, np.zeros(points.size))
+    u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), load)).reshape(-1, 2)
+    assert np.allclose(u, exact, atol=1e-12 * np.abs(exact).max())
+    strain = assembly.strains(each, points[cells], u[cells], each.gauss[0], axisymmetric=True)
+    assert np.allclose(strain, [a, b, a, 0], atol=1e-11)
+
+
+@pytest.mark.parametrize("name", PLANE)
+def test_axisymmetric_rigid_mode_and_forces(name: str) -> None:
+    """Only the translation along the axis is free; internal forces are the stiffness times the displacement."""
+    points, cells = meridian(name, 4)
+    each, D, X = SHAPES[name], isotropic(E, NU, "AXIS"), points[cells]
+    Ke = assembly.element_stiffness(each, X, D, axisymmetric=True)
+    K = assembly.assemble(len(points), 2, [(cells, Ke)]).toarray()
+    values, vectors = np.linalg.eigh(K)
+    assert abs(values[0]) < 1e-12 * values[-1]
+    assert values[1] > 1e-6 * values[-1]
+    assert np.allclose(np.abs(vectors[:, 0].reshape(-1, 2)), [0, 1 / np.sqrt(len(points))], atol=1e-9)
+    u = np.random.default_rng(6).standard_normal(points.shape)
+    stress = assembly.stresses(assembly.strains(each, X, u[cells], each.gauss[0], axisymmetric=True), D)
+    forces = assembly.internal_forces(each, X, stress, axisymmetric=True)
+    expected = (Ke @ u[cells].reshape(len(cells), -1, 1)).reshape(forces.shape)
+    assert np.allclose(forces, expected, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", PLANE)
+def test_axisymmetric_pressure_and_volume(name: str) -> None:
+    """Under pressure all round, the force along the axis vanishes; volume, mass and body force agree with Guldin."""
+    points, cells = meridian(name, 8)
+    each = SHAPES[name]
+    total = np.zeros(2)
+    for face, facets in topology.boundary([(name, cells)]).items():
+        total += assembly.pressure_load(SHAPES[face], points[facets.nodes], 3.0, axisymmetric=True).sum(axis=(0, 1))
+    assert abs(total[1]) < 1e-11
+    points, cells = box(name, (3, 2))
+    points = points + [1.0, 0.0]
+    volume = np.pi * (4.0**2 - 1.0**2) * 2.0
+    X = points[cells]
+    mass = assembly.element_mass(each, X, 2.0, axisymmetric=True)
+    assert mass.sum() == pytest.approx(2 * volume)
+    assert assembly.lumped_mass(each, X, 2.0, axisymmetric=True).sum() == pytest.approx(2 * volume)
+    weight = assembly.distributed_load(each, X, np.array([0.0, -1.0]), axisymmetric=True)
+    assert weight.sum(axis=(0, 1)) == pytest.approx([0.0, -volume])
+
+
+def test_a_negative_radius_is_refused() -> None:
+    points, cells = mesh("QUA4", 1)
+    with pytest.raises(BadValue):
+        assembly.element_stiffness(
+            SHAPES["QUA4"], points[cells] - [1.0, 0.0], isotropic(E, NU, "AXIS"), axisymmetric=True
+        )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_lumped_masses_are_positive_and_whole(name: str) -> None:
+    points, cells = mesh(name, 9)
+    lumped = assembly.lumped_mass(SHAPES[name], points[cells], 3.0)
+    assert np.all(lumped > 0)
+    assert np.allclose(lumped.sum(axis=1), 3.0 * geometry.measures(SHAPES[name], points[cells]))
+
+
+@pytest.mark.parametrize(
+    ("name", "shares"),
+    [
+        ("SEG3", [1 / 6, 1 / 6, 2 / 3]),
+        ("TRI6", [0, 0, 0, 1 / 3, 1 / 3, 1 / 3]),
+        ("QUA8", [-1 / 12] * 4 + [1 / 3] * 4),
+    ],
+)
+def test_shares_of_a_uniform_pressure_on_quadratic_facets(name: str, shares: list[float]) -> None:
+    """Flat facets: corners of QUA8 are pulled, those of TRI6 feel nothing."""
+    each = SHAPES[name]
+    X = np.zeros((1, each.n_nodes, each.dim + 1))
+    X[0, :, : each.dim] = each.ref_nodes
+    forces = assembly.pressure_load(each, X, 1.0)[0]
+    normal = forces @ forces.sum(axis=0) / np.linalg.norm(forces.sum(axis=0))
+    assert np.allclose(normal, np.array(shares) * geometry.measures(each, X)[0], atol=1e-14)
