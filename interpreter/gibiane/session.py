@@ -17,7 +17,7 @@ from gibiane.library import Library, read_script
 from gibiane.nodes import Instr
 from gibiane.source import SourceText, Span
 from gibiane.syntax import parse
-from gibiane.values import Value, type_of
+from gibiane.values import PREDEFINED, Value, type_of
 
 EXIT_CODES = {0: 0, 1: 4, 2: 8, 3: 12}
 INTERNAL_FAILURE, INTERRUPTED = 70, 130
@@ -30,7 +30,8 @@ RECURSION_LIMIT = 12_000
 def default_options() -> dict[str, Any]:
     """Return the options of a new session (OPTI)."""
     return {"DIME": 0, "MODE": None, "ELEM": None, "DENS": 0.0, "ECHO": 0, "ERRE": "NORM", "LANG": None, "LOCA": False,
-            "WARN": False, "EXEC": False, "STRICT": False}
+            "WARN": False, "EXEC": False, "STRICT": False, "PREC": sys.float_info.epsilon,
+            "PETI": sys.float_info.min, "GRAN": sys.float_info.max, "TRAC": "PNG", "COUL": "DEFA"}
 
 
 class Session:
@@ -70,7 +71,7 @@ class Session:
         self._ordinals: dict[int, tuple[int, Any]] = {}
         self.evaluator = Evaluator(self)
         self.globals = Frame(self.evaluator, None, None)
-        self.globals.names.update({"VRAI": True, "FAUX": False, "D": "DROI", "C": "CERC"})
+        self.globals.names.update(PREDEFINED)
         self.evaluator.frame = self.globals
         load_operators(self)
 

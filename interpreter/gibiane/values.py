@@ -6,6 +6,7 @@ ENTIER, FLOTTANT, LOGIQUE and MOT are Python's int, float, bool and str; every o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -21,6 +22,9 @@ POINT, MAILLAGE, CHPOINT, MCHAML, MMODEL, RIGIDITE = "POINT", "MAILLAGE", "CHPOI
 LISTENTI, LISTREEL, LISTMOTS, LISTCHPO, LISTOBJE = "LISTENTI", "LISTREEL", "LISTMOTS", "LISTCHPO", "LISTOBJE"
 EVOLUTIO, CHARGEME, DEFORME, VECTEUR = "EVOLUTIO", "CHARGEME", "DEFORME", "VECTEUR"
 ANY = "ANY"
+
+# Names that every session starts with; a script may give them another value.
+PREDEFINED: dict[str, Any] = {"VRAI": True, "FAUX": False, "PI": math.pi, "D": "DROI", "C": "CERC"}
 
 _PLAIN: dict[type, str] = {int: ENTIER, float: FLOTTANT, bool: LOGIQUE, str: MOT}
 

@@ -53,9 +53,13 @@ def _density(ctx: Context, q: Operands) -> float:
 
 
 def _mode(ctx: Context, q: Operands) -> str:
+    i = q.first_word()
+    # What VALE MODE gives is in one word: PLANCONT.
+    joined = str(q.values[i])[4:8].upper() if i >= 0 else ""
     word = q.need_keyword(("PLAN", "AXIS", "TRID", "FOUR", "UNID"))
     if word == "PLAN":
-        return "PLAN " + (q.read_keyword(("CONT", "DEFO", "GENE")) or "DEFO")
+        variants = ("CONT", "DEFO", "GENE")
+        return "PLAN " + (joined if joined in variants else q.read_keyword(variants) or "DEFO")
     if word == "UNID":
         return "UNID " + (q.read_keyword(("PLAN", "AXIS", "SPHE")) or "PLAN")
     if word == "FOUR":
@@ -152,7 +156,8 @@ def _opti(ctx: Context, q: Operands) -> None:
 
 
 VALE = operator("VALEUR", topic="language", summary="value of an option", terminal=True,
-                notice="Reads an option: DIME, ELEM, MODE, DENS, ECHO, ERRE. 'ERMA' is the highest error level so far.",
+                notice="Reads an option: DIME, ELEM, MODE (PLANDEFO, PLANCONT, AXIS, TRID), DENS, ECHO, ERRE; PREC PETI "
+                       "GRAN are the precision, the smallest and the largest FLOTTANT. 'ERMA' is the highest error level so far.",
                 example="OPTI DIME 2 ; MESS (VALE DIME) ;", see=["OPTION"])
 
 
@@ -162,9 +167,11 @@ def _vale(ctx: Context, q: Operands) -> Any:
     if word == "ERMA":
         return ctx.session.worst
     value = ctx.session.options.get(word)
+    if word == "MODE" and value is None:
+        value = {2: "PLAN DEFO", 3: "TRID"}.get(ctx.session.options["DIME"])
     if value is None:
         ctx.fail(19, "the option {word} has no value yet", word=word)
-    return value
+    return value.replace(" ", "") if word == "MODE" else value
 
 
 TITR = operator("TITRE", topic="output", summary="title of the pictures that follow",

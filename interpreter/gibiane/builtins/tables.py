@@ -8,7 +8,7 @@ from gibiane.binding import Operands
 from gibiane.diagnostics import nearest
 from gibiane.forms import Arg
 from gibiane.registry import Context, Refused, operator
-from gibiane.values import ANY, ENTIER, MOT, TABLE, Table, type_of
+from gibiane.values import ANY, ENTIER, MOT, PREDEFINED, TABLE, Table, type_of
 
 TABL = operator("TABLE", topic="tables", summary="make a table",
                 notice="An empty table, with its subtype if given (entry 'SOUSTYPE'). `TABL T` gives the table T "
@@ -63,7 +63,7 @@ def _named(ctx: Context, q: Operands) -> Any:
     wanted = str(q.need(MOT, "the type of the objects")).strip()[:8]
     found = Table()
     for name, value in sorted(ctx.session.names().items()):
-        if type_of(value)[:8] == wanted and name not in ("VRAI", "FAUX", "D", "C") and name[0] != "&":
+        if type_of(value)[:8] == wanted and PREDEFINED.get(name) is not value and name[0] != "&":
             found.set(name, value)
     return found
 

@@ -13,7 +13,7 @@ from gibiane.nodes import Literal
 from gibiane.registry import Context, operator
 from gibiane.source import SourceText
 from gibiane.syntax import parse
-from gibiane.values import ANY, ENTIER, FLOTTANT, LOGIQUE, MOT, PROCEDUR, TEXTE, Texte, type_of
+from gibiane.values import ANY, ENTIER, FLOTTANT, LOGIQUE, MOT, PREDEFINED, PROCEDUR, TEXTE, Texte, type_of
 
 MARKS = frozenset("*/<>")
 FORMAT_KEY = Key("FORMAT", "Fortran format of the reals that follow", Arg("format", MOT, "descriptor"))
@@ -203,7 +203,7 @@ def _list(ctx: Context, q: Operands) -> None:
 def _list_names(ctx: Context, wanted: str | None) -> None:
     by_type: dict[str, list[str]] = {}
     for name, value in ctx.session.names().items():
-        if name not in ("VRAI", "FAUX", "D", "C") and not name.startswith("&"):
+        if PREDEFINED.get(name) is not value and not name.startswith("&"):
             by_type.setdefault(type_of(value), []).append(name)
     for kind in sorted(by_type):
         if wanted is None or kind[:8] == wanted[:8]:
