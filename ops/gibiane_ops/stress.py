@@ -83,11 +83,27 @@ EPTH = operator(
 
 @EPTH.form(
     Arg("model", MMODEL, "model"),
-    Arg("material", MCHAML, "material", subtype=MATERIAL),
-    Arg("t", (CHPOINT, MCHAML), "temperature"),
+    Arg("material", MCHAML, "material"),
+    Arg("t", CHPOINT, "temperature"),
     gives=[MCHAML],
 )
-def _epth(ctx: Context, model: Modele, material: MChaml, t: ChPoint | MChaml) -> MChaml:
+def _epth(ctx: Context, model: Modele, material: MChaml, t: ChPoint) -> MChaml:
+    return _thermal_strain(ctx, model, material, t)
+
+
+@EPTH.form(
+    Arg("model", MMODEL, "model"),
+    Arg("material", MCHAML, "material"),
+    Arg("t", MCHAML, "temperature"),
+    gives=[MCHAML],
+)
+def _epth_elements(ctx: Context, model: Modele, material: MChaml, t: MChaml) -> MChaml:
+    (found,) = told_apart(ctx, [("material", material), ("t", t)], MATERIAL)
+    return _thermal_strain(ctx, model, found, t if found is material else material)
+
+
+def _thermal_strain(ctx: Context, model: Modele, material: MChaml, t: ChPoint | MChaml) -> MChaml:
+    (material,) = told_apart(ctx, [("material", material)], MATERIAL)
     zones = []
     for zone in solid_zones(ctx, model):
         heated = _temperature(ctx, zone, t)
