@@ -117,8 +117,9 @@ class Operands:
         if self.values:
             label = self.describe(0, wanted)
             labels, span = [label], label.span
-        template = "no {type} among its operands" if what is None else "no {type} for {what}"
+        template = "no {type} among its operands" if what is None else "no {type} ({what}) among its operands"
         failure = make(37, template, type=wanted, what=what, labels=labels, span=span)
+        failure.hint = self.session.state.get("makers", {}).get(wanted.split(" ")[0])
         self.point_at_word(failure)
         return GibianeError(failure)
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from gibiane_ops.makers import MAKERS
+
 if TYPE_CHECKING:
     from gibiane.registry import Context
 
@@ -30,8 +32,9 @@ DEFAULT_MODE = {1: "UNID PLAN", 2: "PLAN DEFO", 3: "TRID"}
 
 
 def prepare(session: Any) -> None:
-    """Give a session its maker of points and its checks of OPTI DIME, ELEM, MODE and COUL."""
+    """Give a session its maker of points, its hints, and its checks of OPTI DIME, ELEM, MODE and COUL."""
     session.point_maker = _point_maker(session)
+    session.state["makers"] = MAKERS
     for name, check in (("DIME", _dimension), ("ELEM", _element), ("MODE", _mode), ("COUL", _colour)):
         session.listeners.setdefault(name, []).append(check)
 

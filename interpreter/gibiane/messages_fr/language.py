@@ -11,7 +11,7 @@ LANGUAGE = {
     "two operands are wanted; a sign belongs to a number only: write -1 * X": "il faut deux opérandes ; seul un nombre porte un signe : écrire -1 * X",
     "cannot work on {left} and {right}": "ne sait pas opérer sur {left} et {right}",
     "no {type} among its operands": "aucun {type} parmi ses opérandes",
-    "no {type} for {what}": "il manque un {type}",
+    "no {type} ({what}) among its operands": "pas de {type} ({what}) parmi ses opérandes",
     "{what}; a {wanted} is needed here": "{what} ; il faut ici un {wanted}",
     "did you mean {close}?": "vouliez-vous dire {close} ?",
     "did you mean '{close}'?": "vouliez-vous dire '{close}' ?",
