@@ -7,6 +7,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import MAILLAGE, MMODEL, MOT
 from gibiane_ops.kernels.elements.table import SHAPES, shape
+from gibiane_ops.kernels.mesh import orientation
 from gibiane_ops.values.maillage import Block, Maillage
 from gibiane_ops.values.modele import ContactZone, Modele, ModelZone
 
@@ -116,7 +117,20 @@ def _solid_zone(ctx: Context, mesh: Maillage, block: Block, law: tuple[str, ...]
         )
     if bars and (mode == "AXIS" or "ORTHOTROPE" in law):
         ctx.fail(81, "bars go with isotropic materials and the modes TRID and PLAN", at="mesh 1")
+    if dim == 2 and not bars:
+        block = _counterclockwise(mesh, block)
     return ModelZone(Maillage(mesh.store, [block]), "MECANIQUE", (*law, "BARR") if bars else law, mode)
+
+
+def _counterclockwise(mesh: Maillage, block: Block) -> Block:
+    """Turn over the plane elements that turn clockwise: a line pushed to its right makes such a surface."""
+    x = mesh.store.coords[block.cells][:, :, :2]
+    clockwise = orientation.negative(block.shape, x)
+    if not len(clockwise):
+        return block
+    cells = block.cells.copy()
+    cells[clockwise] = orientation.reversed_cells(block.shape, cells[clockwise])
+    return Block(block.shape, cells, block.colours)
 
 
 def _contact_model(ctx: Context, q: Operands, meshes: list[Maillage], words: list[str]) -> Modele:

@@ -28,7 +28,9 @@ def worded(ctx: Context, *, at: str | None = None) -> Iterator[None]:
             number=first + 1,
             value=f"{failure.volumes[0]:.4g}",
             where=where,
-            hint="its nodes turn the wrong way: ORIE turns elements round, INVE lines",
+            hint="its sides cross, or its corners are aligned"
+            if failure.corners.shape[2] == 2
+            else "its nodes turn the wrong way: ORIE turns elements round, INVE lines",
         )
     except k.BadValue as failure:
         ctx.fail(
