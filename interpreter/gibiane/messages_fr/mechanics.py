@@ -176,7 +176,6 @@ MECHANICS = {
     "{what} = {value} is out of bounds: {limit}": "{what} = {value} est hors bornes : {limit}",
     "{count} {shape} with a negative or zero Jacobian: first element {number}, Jacobian {value}, corners {where}": "{count} {shape} de jacobien négatif ou nul : premier élément {number}, jacobien {value}, sommets {where}",
     "its sides cross, or its corners are aligned": "ses côtés se croisent, ou ses coins sont alignés",
-    "its sides cross, or its corners are aligned": "ses côtés se croisent, ou ses coins sont alignés",
     "its nodes turn the wrong way: ORIE turns elements round, INVE lines": "ses noeuds tournent à l'envers : ORIE retourne les éléments, INVE les lignes",
     "{count} nodes lie on the axis, the first at ({where}): they have no radial direction": "{count} noeuds sont sur l'axe, le premier en ({where}) : ils n'ont pas de direction radiale",
     "leave them out with DIFF": "les ôter par DIFF",

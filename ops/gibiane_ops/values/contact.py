@@ -49,6 +49,9 @@ RANGES = {
 _REACH = 0.45
 """Largest gap that pairs of nodes may bridge, over the shortest edge of the slave surface."""
 
+_OFFSET = 0.05
+"""Largest distance along the surface of two nodes that make a pair, over the same edge."""
+
 
 def zone_pairs(ctx: Context, zone: ContactZone, at: str) -> ContactPairs:
     """Return the pairs of a contact zone in nodes of the session (G401, G402 when there are none)."""
@@ -81,13 +84,17 @@ def warn_unpaired(ctx: Context, zone: ContactZone, pairs: ContactPairs, at: str)
 
 
 def _node_pairs(points: FloatArray, zone: ContactZone) -> ContactPairs:
-    """Pair coincident nodes; where there are none, nodes that face each other across a gap shorter than an edge."""
+    """Pair coincident nodes, and those left on both sides that face each other across less than half an edge."""
     slave, master = zone.slave.kernel_blocks, zone.master.kernel_blocks
+    edges = [np.linalg.norm(points[c] - points[np.roll(c, 1, axis=1)], axis=2).min() for _, c in slave if len(c)]
+    edge = float(min(edges, default=0.0))
     try:
-        return node_pairs(points, slave, master)
+        close = node_pairs(points, slave, master)
     except k_errors.EmptyContact:
-        edges = [np.linalg.norm(points[c] - points[np.roll(c, 1, axis=1)], axis=2).min() for _, c in slave if len(c)]
-        return node_pairs(points, slave, master, tolerance=_REACH * float(min(edges, default=0.0)))
+        return node_pairs(points, slave, master, tolerance=_REACH * edge, offset=_OFFSET * edge)
+    if len(close.unpaired_slave) and len(close.unpaired_master):
+        return node_pairs(points, slave, master, tolerance=_REACH * edge, offset=_OFFSET * edge)
+    return close
 
 
 def nodal_property(ctx: Context, values: ChamZone | None, name: str, nodes: IntArray) -> FloatArray | None:

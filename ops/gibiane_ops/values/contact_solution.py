@@ -94,6 +94,15 @@ def solve_contact(
             return condense(system.K, pairs, reduction, stops=system.stops)
         except k_errors.SingularSystem as failure:
             ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
+        except k_errors.ContradictoryConditions:
+            if not len(system.stop_signs):
+                raise
+            ctx.fail(
+                "G407",
+                "a condition with MINI or MAXI acts on what another condition already holds",
+                at="k",
+                hint="leave blocked nodes out of it; an unknown has one of MINI and MAXI",
+            )
 
     with worded(ctx, at="k"):
         condensation: Condensation = kept(

@@ -56,7 +56,12 @@ class ContactPairs:
 
 
 def node_pairs(
-    points: FloatArray, slave: Sequence[Block], master: Sequence[Block], *, tolerance: float | None = None
+    points: FloatArray,
+    slave: Sequence[Block],
+    master: Sequence[Block],
+    *,
+    tolerance: float | None = None,
+    offset: float | None = None,
 ) -> ContactPairs:
     """Pair each slave node with the master node at the same place.
 
@@ -68,6 +73,8 @@ def node_pairs(
     tolerance : float, optional
         Largest distance of two paired nodes; a millionth of the size of the surfaces when left out. Surfaces with an
         initial gap need one above the gap and below half of the node spacing.
+    offset : float, optional
+        Largest distance of two paired nodes along the surface, no limit when left out.
 
     Returns
     -------
@@ -101,6 +108,10 @@ def node_pairs(
     order = np.argsort(distance, kind="stable")
     claims = order[np.unique(nearest[order], return_index=True)[1]]
     kept = np.sort(claims[distance[claims] <= reach])
+    if offset is not None:
+        apart = points[master_nodes[nearest[kept]]] - points[slave_nodes[kept]]
+        across = np.einsum("ni,ni->n", apart, slave_normals[kept])[:, None] * slave_normals[kept]
+        kept = kept[np.linalg.norm(apart - across, axis=1) <= offset]
     if not len(kept):
         raise EmptyContact(f"the nearest nodes are {distance.min():g} apart, the tolerance is {reach:g}")
     partner = nearest[kept]
