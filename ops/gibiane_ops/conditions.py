@@ -19,6 +19,7 @@ from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 from gibiane_ops.values.rigidite import ConditionPart, Rigidite
 
 SENSES = {"MINI": ">", "MAXI": "<"}
+WORDS = (*SENSES, "DEPL", "ROTA")
 _EXAMPLE = (
     "OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
@@ -84,7 +85,8 @@ def _bloq(ctx: Context, q: Operands) -> Rigidite:
             wish.words.extend(wish.names)
             continue
         i = q.first_word()
-        if i < 0 or q.is_operator_word(i):
+        # DEPL and ROTA are operators too; here they are words of BLOQ.
+        if i < 0 or (q.is_operator_word(i) and str(q.values[i])[:4] not in WORDS):
             break
         node = q.nodes[i]
         _word(ctx, q, wish, str(q.need(MOT)).strip(), node)
