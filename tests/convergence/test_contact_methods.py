@@ -12,8 +12,10 @@ from gibiane_ops.kernels.contact.multipliers import solve_multipliers
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.penalty import solve_penalty
 from gibiane_ops.kernels.contact.projected_cg import solve_projected_cg
+from gibiane_ops.kernels.contact.report import STICK
+from gibiane_ops.kernels.contact.status import solve_statuses
 from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
-from gibiane_ops.kernels.errors import BadValue, ContactUnbalanced, NotConverged, UnsupportedLaw
+from gibiane_ops.kernels.errors import BadValue, ContactUnbalanced, NotConverged, StatusCycle, UnsupportedLaw
 
 METHODS = {
     # method, and how far its forces and displacements may be from Newton's, over the largest
@@ -146,3 +148,27 @@ def test_laws_that_a_method_cannot_treat():
     for solve in (solve_tresca_sequence, solve_gauss_seidel, solve_multipliers):
         with pytest.raises(UnsupportedLaw):
             solve(interface, friction(9, mu=0.2, adhesion=1.0))
+
+
+@pytest.mark.parametrize(("scene", "limit"), [("T1_2h", 25), ("T4_2h", 45)])
+@pytest.mark.parametrize("mu", [0.001, 0.003, 0.01])
+def test_weak_friction_on_an_opening_contact(scene, limit, mu):
+    # friction only settles where the block drifts to: full steps from the tied bodies go round in circles
+    state = solve_coulomb(blocks(scene).interface, mu)
+    assert state.iterations <= limit
+    assert state.report.worst < 1e-9
+    assert state.report.n_open > 0
+
+
+def test_statuses_that_hold_sticking_pairs():
+    interface = blocks("T1_2").interface
+    exact = solve_coulomb(interface, 0.2)
+    slip = np.linalg.norm(exact.w[:, 1:], axis=1)
+    found = solve_statuses(interface, 0.2, sticking_distance=1e-3 * slip.max())
+    assert np.abs(found.w[found.status == STICK, 1:]).max() < 1e-12
+    assert found.report.worst < 1.0
+    with pytest.raises(StatusCycle) as caught:
+        solve_statuses(interface, 0.2, sticking_distance=0.5 * slip.max())
+    assert caught.value.period >= 1
+    assert len(caught.value.pairs) > 0
+    assert len(caught.value.history) < 100

@@ -8,6 +8,7 @@ from gibiane_ops.kernels.contact.interface import bare_interface
 from gibiane_ops.kernels.contact.newton import solve_coulomb, solve_tied
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState
 from gibiane_ops.kernels.contact.status import solve_statuses
+from gibiane_ops.kernels.contact.uniqueness import compare_starts
 from gibiane_ops.kernels.errors import BadValue, ContactUnbalanced
 
 
@@ -39,6 +40,16 @@ def test_one_pair_with_three_solutions(w, r, status):
     np.testing.assert_allclose(found.r, [r], atol=1e-10)
     assert found.status[0] == status
     assert found.report.worst < 1e-9
+
+
+def test_other_solutions_are_found():
+    stuck = solve_coulomb(THREE, 2.0)
+    assert stuck.status[0] == STICK
+    found = compare_starts(THREE, 2.0, stuck)
+    assert not found.unique
+    assert {int(other.status[0]) for other in found.others} == {OPEN}
+    # mu |S_nt| < S_tt: one solution
+    assert compare_starts(THREE, 0.4, solve_coulomb(THREE, 0.4)).unique
 
 
 @pytest.mark.parametrize("f", [1.0, 5.0, -1.0])

@@ -8,6 +8,7 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.balance import raise_if_runaway, raise_if_unbalanced
+from gibiane_ops.kernels.contact.drift import without_drift
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.outcome import physical_state
@@ -20,6 +21,9 @@ ROUND_OFF = 1e-14
 
 SOFT_GAMMA = 1e-3
 """Second value of gamma: pairs whose slip is small and turns back and forth settle with it."""
+
+_FEW = 20
+"""Steps of an attempt that either succeeds soon or not at all."""
 
 _STALL = 8
 """Full steps without a better residual after which another attempt is made."""
@@ -74,8 +78,8 @@ def solve_coulomb(
     With ``a = r - gamma (w - gap n)``: open when ``a_n >= 0`` (r = 0), stick when ``abs(a_t) <= mu abs(a_n)`` (w_t = 0)
     and slip otherwise (``r_t = mu abs(r_n) a_t / abs(a_t)``). Coulomb solutions are unique for small coefficients only:
     for large ones this is one solution. When full steps fail, the load is first checked against the cone on the free
-    motions; then come a softer gamma, damped steps, and growing coefficients. With adhesion the pairs that touch start
-    bonded, and those whose tension exceeds it come off, the worst first, each set once and for all.
+    motions; then come a start without friction, a softer gamma, damped steps, and growing coefficients. With adhesion
+    the pairs that touch start bonded, and those whose tension exceeds it come off, the worst first, each set for good.
 
     Source
     ------
@@ -225,6 +229,9 @@ def _solve(
     best, last = newton_steps(problem, first, tolerance, max_iter, history)
     if not best.converged:
         raise_if_unbalanced(interface, state(best))
+        if law.rubs.any():
+            best = best.better(_from_frictionless(interface, problem, tolerance, history))
+    if not best.converged:
         # slip may spread from pair to pair, one a step: go on as long as there is progress
         more, last = newton_steps(problem, (last.w, last.r), tolerance, 2 * interface.n_pairs, history)
         best = best.better(more)
@@ -237,6 +244,15 @@ def _solve(
         raise_if_runaway(interface, state(last), state(best))
         raise NotConverged(history, state(best))
     return state(best)
+
+
+def _from_frictionless(interface: Interface, problem: Problem, tolerance: float, history: list[float]) -> Iterate:
+    """Start from contact without friction: near it when friction is weak and only settles where the body drifts to."""
+    nothing = np.zeros(interface.n_pairs)
+    smooth = replace(problem, law=replace(problem.law, mu=nothing, cohesion=nothing), gamma=min(problem.gamma, 0.01))
+    free = newton_steps(smooth, problem.tied(), tolerance, _FEW, history)[0]
+    first = without_drift(free.w * problem.length, interface) / problem.length, free.r
+    return newton_steps(replace(smooth, law=problem.law), first, tolerance, _FEW, history, damped=True)[0]
 
 
 def robust_steps(

@@ -14,7 +14,7 @@ from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
 
 SAME = 1e-6
-"""Largest difference of forces, over the largest, of two states that are one solution."""
+"""Largest difference of forces, over the largest force or condensed load, of two states that are one solution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Comparison:
     unique : bool
         No start leads to another solution. Solutions that no start finds may exist all the same.
     difference : float
-        Largest difference of forces, over the largest force.
+        Largest difference of forces, over the largest force or condensed load.
     others : list of ContactState
         Solutions that differ.
     """
@@ -71,7 +71,7 @@ def compare_starts(
     """
     starts: list[ContactState | None] = [None]
     others: list[ContactState] = []
-    scale = float(np.abs(state.r).max(initial=0)) or 1.0
+    scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
     worst = 0.0
     try:
         starts.append(solve_coulomb(interface, 0.0))
