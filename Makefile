@@ -2,6 +2,7 @@
 # make test    the test suite (slow and bench tests are left out)
 # make check   format, lint, types, layers, generated documents
 # make bench   time and memory of a few scenes
+# make fuzz    random scripts for some minutes
 # make clean   remove what the others made
 #
 # Needs Python >= 3.11 and make. Everything else goes into .venv inside this folder.
@@ -12,7 +13,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 DEMO := examples/adaptation
 
-.PHONY: demo test check bench clean venv venv-dev
+.PHONY: demo test check bench fuzz clean venv venv-dev
 .DEFAULT_GOAL := demo
 
 $(BIN)/python:
@@ -50,6 +51,9 @@ check: venv-dev
 
 bench: venv
 	$(BIN)/python -m pytest -m bench -s
+
+fuzz: venv
+	GIBIANE_FUZZ=20000 $(BIN)/python -m pytest tests/properties/test_fuzz.py
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache examples/*/results

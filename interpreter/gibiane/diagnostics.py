@@ -189,6 +189,9 @@ def _calls(trace: list[tuple[str, Span]]) -> list[str]:
     return shown if len(shown) <= 12 else [*shown[:6], "...", *shown[-5:]]
 
 
+WIDEST = 160  # columns of a source line that are shown; of a longer one, what stands round the place
+
+
 def _excerpt(labels: Sequence[Label], margin: str, lang: str, paint: Any) -> list[str]:
     """Source lines of the labels, each label with carets on a line of its own."""
     bar = paint("|", "blue")
@@ -198,11 +201,16 @@ def _excerpt(labels: Sequence[Label], margin: str, lang: str, paint: Any) -> lis
         span = label.span
         raw = span.source.line(span.line)
         text, column = expand_tabs(raw, span.column)
-        if span.line != shown:
+        text = text.rstrip()
+        is_wide = len(text) > WIDEST
+        cut = max(column - WIDEST // 2, 0) if is_wide else 0
+        if span.line != shown or is_wide:
             number = paint(str(span.line).rjust(len(margin)), "blue")
-            lines.append(f"{number} {bar} {text.rstrip()}")
+            piece = text[cut : cut + WIDEST]
+            lines.append(f"{number} {bar} {'...' + piece[3:] if cut else piece}{'...' if is_wide else ''}")
             shown = span.line
-        room = len(raw) - span.column + 1
+        column -= cut
+        room = min(len(raw) - span.column + 1, WIDEST - column + 1)
         width = max(1, min(span.end - span.start, room))
         caption = label.text.render(lang)
         lines.append(f"{margin} {bar} {' ' * (column - 1)}{paint('^' * width, 'red')}{' ' + caption if caption else ''}")

@@ -233,6 +233,7 @@ class Evaluator:
 
     def evaluate(self, q: Operands, n_targets: int) -> None:
         """Apply the evaluation rule to a queue until no operator is left to run."""
+        expanded = 0
         while True:
             kinds = {type(value) for value in q.values}
             if Mark in kinds:
@@ -242,6 +243,9 @@ class Evaluator:
             if i >= 0 and type(q.values[i]) is str:
                 op = find(q.values[i])
             if Texte in kinds and (op is None or op.name not in KEEPS_TEXT) and self._expand_texts(q):
+                expanded += 1
+                if expanded > procedures.MAX_DEPTH:
+                    raise GibianeError(make("G103", "a TEXTE contains itself", span=q.span(q.nodes[0])))
                 continue
             if i < 0:
                 break

@@ -28,6 +28,8 @@ class Token:
         self.end_pos = end
 
 
+MOST_DIGITS = 4000  # of a number literal
+
 _HEADER = r"(?:\*|\$\$\$\$)[^\n]*+"
 _BLANK = re.compile(rf"(?:[ \t\f,]|\n(?:{_HEADER})?+)++")
 _FIRST_LINE = re.compile(_HEADER)
@@ -36,7 +38,8 @@ _NUMBER = re.compile(r"(?:\d++(\.\d*+)?|(\.\d++))([EeDd][+-]?\d++)?")
 _WORD = re.compile(r"[A-Za-z_@&!#?$][A-Za-z0-9_@&!#?$]*+")
 _DIGIT_WORD = re.compile(r"\d+[A-Za-z_@&!#?$][A-Za-z0-9_@&!#?$]*+")
 _COMPARE = re.compile(r"[<>](?:EG(?![A-Za-z0-9_@&!#?$]))?", re.IGNORECASE)
-_INDEX_REAL = re.compile(r"\d++(?:\.\d++(?:[EeDd][+-]?\d++)?)?")
+# `T . 3. = x` has the index 3., for a separator needs something after it
+_INDEX_REAL = re.compile(r"\d++(?:\.\d++(?:[EeDd][+-]?\d++)?|\.(?=\s*+[=;)]))?")
 _INDEX_DIGITS = re.compile(r"\d++")
 _LINE_BREAK = re.compile(r"\n(?:\*[^\n]*+)?+")
 
@@ -86,7 +89,7 @@ def tokens(source: SourceText, errors: dict[int, Diagnostic], start: int = 0) ->
         elif after_dot and char in _DIGITS:
             pattern = _INDEX_DIGITS if before == "." else _INDEX_REAL
             end = pattern.match(text, at).end()  # type: ignore[union-attr]
-            yield Token("NUMBER", number_value(text[at:end]), at, end)
+            yield _number(source, errors, at, end)
         elif char in _DIGITS:
             found = _NUMBER.match(text, at)
             end = found.end()  # type: ignore[union-attr]
@@ -94,7 +97,7 @@ def tokens(source: SourceText, errors: dict[int, Diagnostic], start: int = 0) ->
                 end = word.end()
                 yield Token("NAME", text[at:end], at, end)
             else:
-                yield Token("NUMBER", number_value(text[at:end]), at, end)
+                yield _number(source, errors, at, end)
         elif char == "'":
             found = _STRING.match(text, at)
             if found is None:
@@ -115,10 +118,10 @@ def tokens(source: SourceText, errors: dict[int, Diagnostic], start: int = 0) ->
             continue
         elif char in "+-." and before not in _NO_SIGN_AFTER and (found := _NUMBER.match(text, at + (char != "."))):
             end = found.end()
-            yield Token("NUMBER", number_value(text[at:end]), at, end)
+            yield _number(source, errors, at, end)
         elif char == ".":
             end = _NUMBER.match(text, at).end()  # type: ignore[union-attr]
-            yield Token("NUMBER", number_value(text[at:end]), at, end)
+            yield _number(source, errors, at, end)
         elif char == "*":
             end = at + (2 if text.startswith("**", at) else 1)
             yield Token("SYMBOL", text[at:end], at, end)
@@ -137,6 +140,14 @@ def tokens(source: SourceText, errors: dict[int, Diagnostic], start: int = 0) ->
                               span=Span(source, at, end), hint=_hint_for(char))
         after_dot = False
         at = end
+
+
+def _number(source: SourceText, errors: dict[int, Diagnostic], start: int, end: int) -> Token:
+    if end - start > MOST_DIGITS:
+        errors[start] = make("G101", "a number of {length} characters", length=end - start,
+                             span=Span(source, start, start + 1), hint="at most {most} are read", most=MOST_DIGITS)
+        return Token("NUMBER", 0, start, end)
+    return Token("NUMBER", number_value(source.text[start:end]), start, end)
 
 
 def _hint_for(char: str) -> str:

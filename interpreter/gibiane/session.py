@@ -49,6 +49,7 @@ class Session:
 
     def __init__(self, *, out: TextIO | None = None, err: TextIO | None = None, interactive: bool = False,
                  colour: bool = False) -> None:
+        sys.set_int_max_str_digits(0)  # an ENTIER has no largest value
         self.out = out if out is not None else sys.stdout
         self.err = err if err is not None else sys.stderr
         self.interactive = interactive

@@ -262,7 +262,7 @@ def _line_start(instr: Instr, held: list[Token], habits: Habits | None) -> Diagn
         if before.type in ("ACCESS", "EQUAL") or locate(before.end_pos - 1)[0] == locate(token.start_pos)[0]:
             continue
         word = _word(token)
-        rest = held[i + 1 :]
+        rest = held[i + 1 : i + 3]
         if _assigns(held, i):
             if equals or not _could_be_targets(held[:i], habits):
                 return _report(instr, before, token, 1014 if equals else 315)
@@ -393,7 +393,7 @@ def _same_line(instr: Instr, held: list[Token], habits: Habits) -> Diagnostic | 
         word = _word(token)
         if not word or depth or before.type in ("ACCESS", "EQUAL", "SYMBOL") or _word(before) in _QUOTING:
             continue
-        rest = held[i + 1 :]
+        rest = held[i + 1 : i + 3]
         if habits.assigns(word) or (rest and rest[0].type in ("ACCESS", "EQUAL")):
             continue
         if word in ("FIN", "QUIT", "ITER"):

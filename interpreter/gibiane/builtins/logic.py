@@ -25,7 +25,10 @@ def _and(ctx: Context, a: bool, b: bool, more: list[bool]) -> bool:
 
 @ET.form(Key("TELQUEL", "keep blanks"), Arg("a", MOT, "word"), Arg("b", MOT, "word"), gives=[MOT], last=True)
 def _join(ctx: Context, telquel: bool, a: str, b: str) -> str:
-    return a + b if telquel else a.strip() + b.strip()
+    joined = a + b if telquel else a.strip() + b.strip()
+    if len(joined) > 512:
+        ctx.fail(1114, "the word has {length} characters; 512 is the limit", length=len(joined))
+    return joined
 
 
 OU = operator("OU", topic="logic", summary="logical or", notice="True if one of two or more LOGIQUE is.",
