@@ -6,13 +6,13 @@ Callers ask only about words that nothing here has: the list holds every name, t
 from __future__ import annotations
 
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 
 
 @cache
 def names() -> dict[str, str]:
     """Return the names of operators (four letters) and procedures, each with what is nearest here, or ""."""
-    text = files("gibiane").joinpath("cast3m_names.txt").read_text(encoding="utf-8")
+    text = Path(__file__).with_name("cast3m_names.txt").read_text(encoding="utf-8")
     found = {}
     for line in text.splitlines():
         if line and not line.startswith("#"):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from datetime import datetime
 from typing import Any
 
 from gibiane.forms import Arg, Key
@@ -104,6 +103,8 @@ def _convert(ctx: Context, conversion: float) -> str:
 
 @DATE.form(LETTRE, Key(tuple(PARTS), "one of its numbers", name="part"), gives=["MOT|ENTIER"], last=True)
 def _date(ctx: Context, lettre: bool, part: str | None) -> Any:
+    from datetime import datetime  # slow to import, and seldom asked for
+
     now = datetime.now()
     month = MONTHS[ctx.session.lang][now.month - 1]
     if part == "MOIS" and lettre:
