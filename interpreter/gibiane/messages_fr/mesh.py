@@ -11,8 +11,6 @@ MESH = {
     "the mode {mode} does not go with DIME {dim}": "le mode {mode} ne va pas avec DIME {dim}",
     "in this dimension: {known}; OPTI DIME comes before MODE": "dans cette dimension : {known} ; OPTI DIME vient avant MODE",
     # building
-    "elements of second degree ({element}) are not available yet": "les éléments du second degré ({element}) ne sont pas encore disponibles",
-    "OPTI ELEM CUB8, TET4, QUA4, TRI3 or SEG2": "OPTI ELEM CUB8, TET4, QUA4, TRI3 ou SEG2",
     "a line is wanted, this mesh holds {shapes}": "il faut une ligne, ce maillage contient {shapes}",
     "holds {shapes}": "contient {shapes}",
     "COTE and CONT give the lines of a surface": "COTE et CONT donnent les lignes d'une surface",
@@ -110,6 +108,7 @@ MESH = {
     "the lists have different lengths: {lengths}": "les listes ont des longueurs différentes : {lengths}",
     "{dim} LISTREEL are wanted, one per coordinate; {given} are given": "il faut {dim} LISTREEL, un par coordonnée ; {given} sont donnés",
     "a point follows itself: a segment would have the same node twice": "un point se suit lui-même : un segment aurait deux fois le même noeud",
+    "{count} points do not make whole SEG3: corners and mid-nodes in turn are wanted": "{count} points ne font pas des SEG3 entiers : il faut tour à tour sommets et milieux",
     "at least two points are wanted for a line": "une ligne demande au moins deux points",
     "this mesh has no contour: it holds {shapes}": "ce maillage n'a pas de contour : il contient {shapes}",
     "a closed surface has none, and ENVE gives the boundary of a volume; 'NOID' accepts an empty result": "une surface fermée n'en a pas, et ENVE donne le bord d'un volume ; 'NOID' accepte un résultat vide",

@@ -19,7 +19,8 @@ from gibiane_ops.values.nodes import NodeStore, node_store
 
 TRIANGLES = ("TRI3", "TRI6", "TET4", "TE10", "PRI6", "PR15", "PYR5", "PY13")
 SECOND_DEGREE = ("SEG3", "TRI6", "QUA8", "TE10", "PY13", "PR15", "CU20")
-LINES, SURFACES, VOLUMES = ("SEG2",), ("TRI3", "QUA4"), ("TET4", "PYR5", "PRI6", "CUB8")
+LINES = ("SEG2", "SEG3")
+SURFACES, VOLUMES = ("TRI3", "QUA4"), ("TET4", "PYR5", "PRI6", "CUB8")
 DIMENSION = {name: each.dim for name, each in SHAPES.items()}
 
 
@@ -37,29 +38,10 @@ def dimension(ctx: Context) -> int:
     return dim
 
 
-def _degree_one(ctx: Context) -> str:
-    dimension(ctx)
-    element = ctx.option("ELEM") or ""
-    if element in SECOND_DEGREE:
-        ctx.fail(
-            251,
-            "elements of second degree ({element}) are not available yet",
-            element=element,
-            hint="OPTI ELEM CUB8, TET4, QUA4, TRI3 or SEG2",
-        )
-    return str(element)
-
-
-def line_shape(ctx: Context) -> str:
-    """Return the type of the elements of a new line."""
-    _degree_one(ctx)
-    return "SEG2"
-
-
 def surface_shape(ctx: Context) -> str:
-    """Return the type of the elements of a new surface: that of OPTI ELEM, or of the faces of that volume element."""
-    element = _degree_one(ctx)
-    return "TRI3" if element in TRIANGLES else "QUA4"
+    """Return the linear type of the elements of a new surface: that of OPTI ELEM, or of the faces of that volume."""
+    dimension(ctx)
+    return "TRI3" if ctx.option("ELEM") in TRIANGLES else "QUA4"
 
 
 def nodes_of(ctx: Context) -> NodeStore:
@@ -83,12 +65,12 @@ def new_mesh(
 
 
 def line_segments(ctx: Context, mesh: Maillage, at: str) -> IntArray:
-    """Return the segments of a line, (m, 2).
+    """Return the ends of the segments of a line, (m, 2).
 
     Raises
     ------
     GibianeError
-        16 when it holds anything but SEG2.
+        16 when it holds anything but segments of one type.
     """
     block = mesh.single()
     if block is None or block.shape not in LINES:
@@ -101,11 +83,11 @@ def line_segments(ctx: Context, mesh: Maillage, at: str) -> IntArray:
             label="holds {shapes}",
             hint="COTE and CONT give the lines of a surface",
         )
-    return block.cells
+    return block.cells[:, :2]
 
 
 def line_nodes(ctx: Context, mesh: Maillage, at: str) -> IntArray:
-    """Return the nodes along a line; the last equals the first on a closed one.
+    """Return the corners along a line; the last equals the first on a closed one.
 
     Raises
     ------

@@ -25,9 +25,9 @@ from gibiane_ops.mesh.building import (
     new_mesh,
     nodes_of,
 )
-from gibiane_ops.mesh.degree import LINEAR, linear_mesh, quadratic_mesh
+from gibiane_ops.mesh.degree import LINEAR, bend_diagonals, is_quadratic, linear_mesh, quadratic_mesh
 from gibiane_ops.values.listes import ListEnti
-from gibiane_ops.values.maillage import Block, Maillage, Point
+from gibiane_ops.values.maillage import Block, Maillage, Point, cells_from_turn
 
 CHAN = operator(
     "CHANGER",
@@ -129,7 +129,7 @@ def _connect(ctx: Context, kind: str | None, g: Maillage, numbers: ListEnti) -> 
         )
     if len(wanted) and not (wanted.min() >= 1 and wanted.max() <= len(points)):
         ctx.fail(36, "the mesh has points 1 to {count} only", at="numbers", count=len(points))
-    return new_mesh(ctx, [(name, points[wanted - 1].reshape(-1, size))])
+    return new_mesh(ctx, [(name, cells_from_turn(name, points[wanted - 1].reshape(-1, size)))])
 
 
 @CHAN.form(Key(KINDS, "type of the elements", name="kind"), Arg("g", MAILLAGE, "mesh"), gives=[MAILLAGE])
@@ -139,15 +139,33 @@ def _changer(ctx: Context, kind: str | None, g: Maillage) -> Maillage:
         return quadratic_mesh(ctx, g)
     if target == "LINEAIRE":
         return linear_mesh(ctx, g)
-    if target in LINEAR:
-        return quadratic_mesh(ctx, _changer(ctx, LINEAR[target], linear_mesh(ctx, g)))
     if target == "POI1":
         return Maillage.of_nodes(g.store, g.nodes_in_order())
+    if target in LINEAR or (is_quadratic(g) and target in ("LIGNE", "SURFACE")):
+        corners = linear_mesh(ctx, g)
+        if is_quadratic(g):
+            _bend(ctx, corners, target)
+        return quadratic_mesh(ctx, _changer(ctx, LINEAR.get(target, target), corners))
+    if is_quadratic(g):
+        g = linear_mesh(ctx, g)
     if target in ("SEG2", "LIGNE"):
         return _edges(ctx, g)
     if target == "SURFACE":
         return _facets(ctx, g)
     return _cut(ctx, g, target, CUTTERS[target])
+
+
+def _bend(ctx: Context, g: Maillage, target: str) -> None:
+    """Let the cuts of curved faces follow their curve."""
+    if target in ("TRI6", "TE10"):
+        faces = topology.faces_of([b for b in g.kernel_blocks if b[0] in VOLUMES]).get("QUA4")
+        inner = np.zeros((0, 4), np.int64) if faces is None else faces.nodes[topology.group_by_nodes(faces.nodes)[1]]
+        quadrangles = np.concatenate([g.cells("QUA4").reshape(-1, 4), inner])
+        bend_diagonals(ctx, quadrangles, simplices.triangles_of_quadrangles(quadrangles))
+    elif target == "PR15":
+        cubes = g.cells("CUB8").reshape(-1, 8)
+        ends = np.concatenate([cubes[:, :4], cubes[:, 4:]])
+        bend_diagonals(ctx, ends, ends[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3))
 
 
 def _target(ctx: Context, kind: str | None) -> str:
@@ -229,7 +247,7 @@ def _against(ctx: Context, g: Maillage, direction: Callable[[Any], Any]) -> Mail
     x = nodes_of(ctx).coords
     wrong = {}
     for block in g.blocks:
-        if block.shape in SURFACES:
+        if DIMENSION[block.shape] == 2:
             with explained(ctx, "g"):
                 normals = geometry.facet_normals(shape(block.shape), x[block.cells])
             side = (normals * direction(geometry.centroids(shape(block.shape), x[block.cells]))).sum(axis=1)
@@ -280,6 +298,8 @@ REGE = operator(
 
 @REGE.form(Arg("g", MAILLAGE, "mesh"), Key("VERI", "accepted"), gives=[MAILLAGE])
 def _rege(ctx: Context, g: Maillage, veri: bool) -> Maillage:
+    if is_quadratic(g):
+        return quadratic_mesh(ctx, _rege(ctx, linear_mesh(ctx, g), veri))
     found = []
     for block in g.blocks:
         by_shape, hopeless = degenerate.lowered(block.shape, block.cells)
@@ -313,6 +333,8 @@ ARET = operator(
 
 @ARET.form(Arg("g", MAILLAGE, "volume or surface"), Arg("angle", FLOTTANT, "degrees", optional=True), gives=[MAILLAGE])
 def _arete(ctx: Context, g: Maillage, angle: float | None) -> Maillage:
+    if is_quadratic(g):
+        return quadratic_mesh(ctx, _arete(ctx, linear_mesh(ctx, g), angle))
     blocks = g.kernel_blocks
     solids = [b for b in blocks if b[0] in VOLUMES]
     skin = [(name, f.nodes) for name, f in topology.boundary(solids).items()]

@@ -11,9 +11,11 @@ from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, operator
 from gibiane.values import ENTIER, FLOTTANT, LISTENTI, MAILLAGE, POINT
+from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import IntArray
-from gibiane_ops.kernels.mesh import edges, locate, unions
+from gibiane_ops.kernels.mesh import locate, unions
 from gibiane_ops.mesh.building import DIMENSION, dimension, join, line_between, line_nodes, nodes_of
+from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
 from gibiane_ops.mesh.merging import as_mesh
 from gibiane_ops.options import ELEMENTS
 from gibiane_ops.values.listes import ListEnti, ListMots
@@ -92,6 +94,7 @@ def _containing(ctx: Context, g: Maillage, contenant: Point, tous: bool, noverif
 
 @ELEM.form(MESH, Key("COMPRIS", "part of a line", Arg("a", POINT), Arg("b", POINT), required=True), gives=[MAILLAGE])
 def _between(ctx: Context, g: Maillage, compris: tuple[Point, Point]) -> Maillage:
+    quadratic, g = is_quadratic(g), linear_mesh(ctx, g)
     nodes = line_nodes(ctx, g, "g")
     closed = len(nodes) > 2 and nodes[0] == nodes[-1]
     places = []
@@ -109,10 +112,11 @@ def _between(ctx: Context, g: Maillage, compris: tuple[Point, Point]) -> Maillag
     if closed:
         ring = nodes[:-1]
         count = (last - first) % len(ring) or len(ring)
-        return line_between(ctx, ring[(first + np.arange(count + 1)) % len(ring)])
+        return finished(ctx, line_between(ctx, ring[(first + np.arange(count + 1)) % len(ring)]), quadratic)
     if first == last:
         ctx.fail(21, "the two points are one: nothing is between them", at="compris")
-    return line_between(ctx, nodes[first : last + 1] if first < last else nodes[last : first + 1][::-1])
+    part = nodes[first : last + 1] if first < last else nodes[last : first + 1][::-1]
+    return finished(ctx, line_between(ctx, part), quadratic)
 
 
 @ELEM.stream(
@@ -231,8 +235,7 @@ def _in_volumes(
 @INCL.form(Arg("g1", MAILLAGE, "mesh"), Arg("g2", MAILLAGE, "closed lines, or surface"), HOW, NOID, gives=[MAILLAGE])
 def _in_contour(ctx: Context, g1: Maillage, g2: Maillage, how: str | None, noid: bool) -> Maillage:
     x = nodes_of(ctx).coords
-    surface = [b for b in g2.kernel_blocks if DIMENSION[b[0]] == 2]
-    lines = edges.contour(surface, "EXTE") if surface else g2.cells("SEG2")
+    lines = _contour_of(g2)
     if len(lines) == 0:
         ctx.fail(
             16,
@@ -257,6 +260,14 @@ def _in_contour(ctx: Context, g1: Maillage, g2: Maillage, how: str | None, noid:
     flag = np.zeros(len(x), bool)
     flag[nodes] = inside & ~on if how == "STRICTEMENT" else inside | on
     return not_empty(ctx, choose(g1, [flag[b.cells].all(axis=1) for b in g1.blocks]), noid, "g1")
+
+
+def _contour_of(g: Maillage) -> IntArray:
+    """Return the segments of closed lines or around surfaces; those of second degree count as two each."""
+    blocks = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 2]
+    found = [f.nodes for f in topology.boundary(blocks).values()] if blocks else [c for _, c in g.kernel_blocks]
+    lines = [cells[:, [0, 2, 2, 1]].reshape(-1, 2) for cells in found if cells.shape[1] == 3]
+    return np.concatenate([np.zeros((0, 2), np.int64), *lines, *(cells for cells in found if cells.shape[1] == 2)])
 
 
 DIFF = operator(

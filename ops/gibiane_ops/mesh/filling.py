@@ -12,6 +12,7 @@ from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, POINT
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import edges
 from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, surface_shape
+from gibiane_ops.mesh.degree import finished, linear_mesh, wants_quadratic
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.maillage import Maillage
 
@@ -130,6 +131,7 @@ def lines_of(mesh: Maillage) -> IntArray:
 
 
 def _contour(ctx: Context, g: Maillage, at: str) -> IntArray:
+    g = linear_mesh(ctx, g)
     segments = lines_of(g)
     if len(segments) == 0 or len(g.shapes) > 1:
         ctx.fail(
@@ -186,10 +188,12 @@ def _surface(ctx: Context, g: Maillage, size: Size, on: Any) -> Maillage:
             kind=on[0],
             hint="DALL can put its nodes on a sphere, a cylinder or a cone",
         )
-    return fill_contour(ctx, _contour(ctx, g, "g"), size, surface_shape(ctx) == "QUA4", "g")
+    filled = fill_contour(ctx, _contour(ctx, g, "g"), size, surface_shape(ctx) == "QUA4", "g")
+    return finished(ctx, filled, wants_quadratic(ctx, g))
 
 
 def _envelope(ctx: Context, g: Maillage, at: str) -> IntArray:
+    g = linear_mesh(ctx, g)
     facets = g.cells("TRI3")
     if "QUA4" in g.shapes:
         ctx.fail(
@@ -212,7 +216,7 @@ def _envelope(ctx: Context, g: Maillage, at: str) -> IntArray:
     Arg("s", MAILLAGE, "closed envelope"), SIZE, Key("VERB", "accepted, says nothing more"), gives=[MAILLAGE], last=True
 )
 def _volume(ctx: Context, s: Maillage, size: Size, verb: bool) -> Maillage:
-    return fill_envelope(ctx, _envelope(ctx, s, "s"), size, "s")
+    return finished(ctx, fill_envelope(ctx, _envelope(ctx, s, "s"), size, "s"), wants_quadratic(ctx, s))
 
 
 MAILLER = operator(

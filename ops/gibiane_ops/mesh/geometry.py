@@ -12,9 +12,10 @@ from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE, POINT
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.mesh.building import DIMENSION, dimension, line_nodes, new_mesh, new_point, nodes_of
+from gibiane_ops.mesh.degree import every_node, is_quadratic, linear_mesh
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.maillage import Maillage, Point
-from gibiane_ops.values.nodes import IntArray
+from gibiane_ops.values.nodes import FloatArray, IntArray
 
 DENS = operator(
     "DENSITE",
@@ -79,7 +80,9 @@ def _coor_mesh(ctx: Context, g: Maillage | ChPoint, n: int | None, curv: bool) -
     if curv:
         if not isinstance(g, Maillage):
             ctx.fail(37, "a line is wanted with 'CURV'", at="g")
-        nodes = line_nodes(ctx, g, "g")
+        nodes = line_nodes(ctx, linear_mesh(ctx, g), "g")
+        if is_quadratic(g):
+            nodes = every_node(ctx, nodes)
         steps = np.linalg.norm(np.diff(store.coords[nodes], axis=0), axis=1)
         along = np.concatenate([[0.0], np.cumsum(steps)])
         kept = nodes[:-1] if nodes[0] == nodes[-1] else nodes
@@ -181,16 +184,28 @@ def _mesu(ctx: Context, g: Maillage, what: str | None, dens: bool) -> float | Ch
     top = max(DIMENSION[name] for name in g.shapes)
     wanted = top if what is None else ("LONG", "SURF", "VOLU").index(what) + 1
     if wanted == top + 1 and top == 1:
-        line = coords[line_nodes(ctx, g, "g")]
-        centred = line - line[0]
-        area = np.cross(centred[:-1], centred[1:]).sum(axis=0) / 2
-        return float(np.linalg.norm(area))
+        line_nodes(ctx, g, "g")
+        return float(np.linalg.norm(_area_inside(g)))
     if wanted == top + 1 and top == 2:
         return abs(_volume_inside(g))
     if wanted > top:
         ctx.fail(16, "this mesh has nothing of this dimension: it holds {shapes}", at="g", shapes=" ".join(g.shapes))
     parts = [geometry.measures(shape(b.shape), coords[b.cells]) for b in g.blocks if DIMENSION[b.shape] == wanted]
     return float(sum(np.abs(part).sum() for part in parts))
+
+
+def _area_inside(g: Maillage) -> FloatArray:
+    """Return the vector area inside a closed line, half the integral of position times tangent, (3,)."""
+    coords = g.store.coords
+    origin = coords[g.nodes[0]]
+    total = np.zeros(3)
+    for block in g.blocks:
+        kind = shape(block.shape)
+        points, weights = kind.mass_gauss
+        X = coords[block.cells] - origin
+        tangent = geometry.jacobians(kind, X, points)[..., 0]
+        total += np.einsum("q,mqi->i", weights, np.cross(geometry.positions(kind, X, points), tangent)) / 2
+    return total
 
 
 def _volume_inside(g: Maillage) -> float:

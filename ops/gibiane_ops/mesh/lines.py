@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,16 +20,16 @@ from gibiane_ops.mesh.building import (
     join,
     line_between,
     line_nodes,
-    line_shape,
     new_mesh,
     nodes_of,
     places_along,
     reference,
     reversed_mesh,
 )
-from gibiane_ops.mesh.degree import LINEAR, linear_mesh, quadratic_mesh
+from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh, quadratic_mesh, wants_quadratic
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
+from gibiane_ops.values.middles import middles_of
 
 COUNT = Arg("n", ENTIER, "number of elements", optional=True)
 DINI = Key("DINI", "density at the first end", Arg("d", FLOTTANT))
@@ -50,15 +51,30 @@ def _sizes(ctx: Context, start: int, end: int, dini: float | None, dfin: float |
     return (float(density[start]) if dini is None else dini), (float(density[end]) if dfin is None else dfin)
 
 
-def _build(ctx: Context, a: End, b: End | None, start: int, end: int, inner: FloatArray, sizes: FloatArray) -> Maillage:
-    """Join two nodes through new ones; lines given for ends are put before and after."""
-    ids = nodes_of(ctx).add(inner, sizes) if len(inner) else np.zeros(0, np.int64)
-    new = line_between(ctx, np.concatenate([[start], ids, [end]]))
-    parts = [a] if isinstance(a, Maillage) else []
-    parts.append(new)
+def _build(
+    ctx: Context,
+    a: End,
+    b: End | None,
+    start: int,
+    end: int,
+    path: Callable[[FloatArray], FloatArray],
+    places: FloatArray,
+    sizes: tuple[float, float],
+) -> Maillage:
+    """Join two nodes along a path, (k,) from 0 to 1 to (k, 3); lines given for ends are put before and after."""
+    given = [each for each in (a, b) if isinstance(each, Maillage)]
+    quadratic = wants_quadratic(ctx, *given)
+    inner = places[1:-1]
+    density = sizes[0] + inner * (sizes[1] - sizes[0])
+    ids = nodes_of(ctx).add(path(inner), density) if len(inner) else np.zeros(0, np.int64)
+    nodes = np.concatenate([[start], ids, [end]])
+    if quadratic:
+        middles_of(ctx).add(chains.segments_of(nodes), path((places[1:] + places[:-1]) / 2))
+    parts = [linear_mesh(ctx, a)] if isinstance(a, Maillage) else []
+    parts.append(line_between(ctx, nodes))
     if isinstance(b, Maillage):
-        parts.append(b)
-    return join(parts)
+        parts.append(linear_mesh(ctx, b))
+    return finished(ctx, join(parts), quadratic)
 
 
 DROI = operator(
@@ -83,7 +99,7 @@ DROI = operator(
     gives=[MAILLAGE],
 )
 def _droit(ctx: Context, n: int | None, a: End, b: End | None, dini: float | None, dfin: float | None) -> Maillage:
-    line_shape(ctx)
+    dimension(ctx)
     start = _last(ctx, a, "a")
     if b is None and isinstance(a, Point):
         ctx.fail(
@@ -97,8 +113,8 @@ def _droit(ctx: Context, n: int | None, a: End, b: End | None, dini: float | Non
     store = nodes_of(ctx)
     x0, x1 = store.coords[start], store.coords[end]
     d0, d1 = _sizes(ctx, start, end, dini, dfin)
-    t = places_along(ctx, float(np.linalg.norm(x1 - x0)), d0, d1, n)[1:-1]
-    return _build(ctx, a, b, start, end, x0 + t[:, None] * (x1 - x0), d0 + t * (d1 - d0))
+    places = places_along(ctx, float(np.linalg.norm(x1 - x0)), d0, d1, n)
+    return _build(ctx, a, b, start, end, lambda t: x0 + t[:, None] * (x1 - x0), places, (d0, d1))
 
 
 CERC = operator(
@@ -136,7 +152,7 @@ def _cercle_rota(
     dini: float | None,
     dfin: float | None,
 ) -> Maillage:
-    line_shape(ctx)
+    dimension(ctx)
     if elim and abs(rota) != 360.0:
         ctx.fail(21, "'ELIM' closes a full turn only, not {angle} degrees", angle=rota)
     store = nodes_of(ctx)
@@ -146,13 +162,14 @@ def _cercle_rota(
     axis = axis_end(ctx, c, e)
     with explained(ctx, "c"):
         radius = arcs.distance_to_axis(first[None], centre, axis)[0]
-        t = places_along(ctx, abs(np.radians(rota)) * float(radius), d0, d1, n)
-        path = np.concatenate([transforms.rotation(rota * float(s), centre, axis)(first[None]) for s in t[1:]])
-    sizes = d0 + t[1:] * (d1 - d0)
-    if elim:
-        return _build(ctx, a, None, start, start, path[:-1], sizes[:-1])
-    end = int(store.add(path[-1:], sizes[-1])[0])
-    return _build(ctx, a, None, start, end, path[:-1], sizes[:-1])
+        places = places_along(ctx, abs(np.radians(rota)) * float(radius), d0, d1, n)
+
+    def path(t: FloatArray) -> FloatArray:
+        turned = [transforms.rotation(rota * float(s), centre, axis)(first[None]) for s in t]
+        return np.concatenate(turned) if turned else np.zeros((0, 3))
+
+    end = start if elim else int(store.add(path(places[-1:]), d1)[0])
+    return _build(ctx, a, None, start, end, path, places, (d0, d1))
 
 
 @CERC.form(
@@ -177,7 +194,7 @@ def _cercle(
     dini: float | None,
     dfin: float | None,
 ) -> Maillage:
-    line_shape(ctx)
+    dimension(ctx)
     start, end = _last(ctx, a, "a"), _first(ctx, a if b is None else b, "b")
     store = nodes_of(ctx)
     x0, x1 = store.coords[start], store.coords[end]
@@ -185,8 +202,7 @@ def _cercle(
     if start == end:
         ctx.fail(21, "its two ends are one point", hint="CERC 'ROTA' 360. P1 C 'ELIM' makes a full circle")
     arc = _through(ctx, x0, c.coords, x1) if through else _about(ctx, x0, c.coords, x1)
-    t = places_along(ctx, arc.length, d0, d1, n)[1:-1]
-    return _build(ctx, a, b, start, end, arc(t), d0 + t * (d1 - d0))
+    return _build(ctx, a, b, start, end, arc, places_along(ctx, arc.length, d0, d1, n), (d0, d1))
 
 
 def _through(ctx: Context, x0: FloatArray, middle: FloatArray, x1: FloatArray) -> arcs.Arc:
@@ -223,7 +239,8 @@ QUEL = operator(
     topic="mesh",
     summary="line through given points",
     notice="`L = QUEL 'SEG2' P1 P2 P3 ...` joins points; a mesh of points (POI1) stands for its points in order. "
-    "`QUEL 'SEG2' LX LY (LZ)` joins new points whose coordinates are lists.",
+    "`QUEL 'SEG2' LX LY (LZ)` joins new points whose coordinates are lists. 'SEG3' takes corners and mid-nodes in "
+    "turn, an odd number of points.",
     example="OPTI DIME 2 ; L = QUEL 'SEG2' (0. 0.) (1. 0.) (1. 1.) ; MESS (NBEL L) ;",
     see=["DROIT", "MANUEL"],
 )
@@ -257,12 +274,16 @@ def _quel(ctx: Context, kind: str, points: list[End]) -> Maillage:
 
 
 def _polyline(ctx: Context, kind: str, nodes: IntArray) -> Maillage:
-    if kind == "SEG3":
-        ctx.fail(251, "elements of second degree ({element}) are not available yet", element=kind)
     if len(nodes) < 2:
         ctx.fail(37, "at least two points are wanted for a line")
+    if kind == "SEG3" and len(nodes) % 2 == 0:
+        ctx.fail(
+            36, "{count} points do not make whole SEG3: corners and mid-nodes in turn are wanted", count=len(nodes)
+        )
     if (nodes[1:] == nodes[:-1]).any():
         ctx.fail(75, "a point follows itself: a segment would have the same node twice")
+    if kind == "SEG3":
+        return new_mesh(ctx, [("SEG3", np.stack([nodes[:-1:2], nodes[2::2], nodes[1::2]], axis=1))])
     return line_between(ctx, nodes)
 
 
@@ -301,7 +322,7 @@ CONT = operator(
     gives=[MAILLAGE],
 )
 def _contour(ctx: Context, g: Maillage, which: str | None, noid: bool) -> Maillage:
-    if not LINEAR.keys().isdisjoint(g.shapes):
+    if is_quadratic(g):
         return quadratic_mesh(ctx, _contour(ctx, linear_mesh(ctx, g), which, noid))
     surface = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 2]
     found = edges.contour(surface, which or "EXTE")

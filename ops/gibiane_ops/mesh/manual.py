@@ -8,15 +8,16 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import MAILLAGE, POINT
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.mesh.building import DIMENSION, SECOND_DEGREE, dimension, new_mesh
-from gibiane_ops.values.maillage import COLOURS, Block, Maillage, Point
+from gibiane_ops.mesh.building import DIMENSION, dimension, new_mesh
+from gibiane_ops.values.maillage import COLOURS, Block, Maillage, Point, cells_from_turn
 
 MANU = operator(
     "MANUEL",
     topic="mesh",
     summary="elements, fields or matrices made by hand",
     notice="`G = MANU TYPE P1 P2 ... (COLOUR)` makes elements of a type from points, as many as an element has for "
-    "each; a mesh stands for its points in order.",
+    "each; a mesh stands for its points in order. Elements of second degree take corners and mid-nodes in turn, layer "
+    "after layer: MANU SEG3 P1 M P2.",
     example="OPTI DIME 2 ; P1 = 0. 0. ; P2 = 1. 0. ; P3 = 1. 1. ; T = MANU TRI3 P1 P2 P3 ; MESS (MESU T) ;",
     see=["QUELCONQUE", "CHANGER"],
 )
@@ -30,15 +31,13 @@ MANU = operator(
 )
 def _mesh(ctx: Context, kind: str, colour: str | None, points: list[Point | Maillage]) -> Maillage:
     dimension(ctx)
-    if kind in SECOND_DEGREE:
-        ctx.fail(251, "elements of second degree ({element}) are not available yet", element=kind)
     nodes = np.concatenate([np.array([p.node]) if isinstance(p, Point) else p.nodes_in_order() for p in points])
     size = shape(kind).n_nodes
     if len(nodes) % size:
         ctx.fail(
             36, "{count} points do not make whole {kind} elements of {size}", count=len(nodes), kind=kind, size=size
         )
-    cells = nodes.reshape(-1, size)
+    cells = cells_from_turn(kind, nodes.reshape(-1, size))
     ordered = np.sort(cells, axis=1)
     twice = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if len(twice):

@@ -14,7 +14,7 @@ from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.mesh import distances
 from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, tolerance_of
 from gibiane_ops.values.listes import ListEnti, ListMots, ListReel
-from gibiane_ops.values.maillage import COLOURS, Block, Maillage, Point
+from gibiane_ops.values.maillage import COLOURS, Block, Maillage, Point, cells_in_turn
 
 POIN = operator(
     "POINT",
@@ -59,7 +59,7 @@ def _end(ctx: Context, g: Maillage, which: str) -> Point:
         ctx.fail(
             16, "a line or a mesh of points is wanted, this mesh holds {shapes}", at="g", shapes=" ".join(g.shapes)
         )
-    return Point(g.store, block.cells[0, 0] if which == "INITIAL" else block.cells[-1, -1])
+    return Point(g.store, block.cells[0, 0] if which == "INITIAL" else block.cells[-1, min(DIMENSION[block.shape], 1)])
 
 
 @POIN.form(MESH, Key("JONC", "where more than two elements meet", required=True), gives=[MAILLAGE])
@@ -112,8 +112,10 @@ def _number(ctx: Context, g: Maillage, i: int, j: int | None) -> Point:
     elif block.shape == "POI1":
         column, row = 1, i
     elif DIMENSION[block.shape] == 1:
-        last = i == len(block.cells) + 1
-        column, row = (2, i - 1) if last else (1, i)
+        # Along a line of second degree corners and mid-nodes come in turn.
+        step = block.cells.shape[1] - 1
+        row = min(max(i - 1, 0) // step + 1, len(block.cells))
+        column = i - (row - 1) * step
     else:
         ctx.fail(
             16,
@@ -131,7 +133,7 @@ def _number(ctx: Context, g: Maillage, i: int, j: int | None) -> Point:
             count=len(block.cells),
             shapes=block.shape,
         )
-    return Point(g.store, block.cells[row - 1, column - 1])
+    return Point(g.store, cells_in_turn(block.shape, block.cells)[row - 1, column - 1])
 
 
 @POIN.form(

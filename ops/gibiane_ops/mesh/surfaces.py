@@ -15,6 +15,7 @@ from gibiane_ops.kernels.mesh import arcs, chains, degenerate, project, sweep, t
 from gibiane_ops.mesh.building import (
     DIMENSION,
     axis_end,
+    dimension,
     explained,
     join,
     line_between,
@@ -26,7 +27,10 @@ from gibiane_ops.mesh.building import (
     reversed_mesh,
     surface_shape,
 )
+from gibiane_ops.mesh.degree import bend_diagonals, every_node, finished, linear_mesh, wants_quadratic
+from gibiane_ops.mesh.sweeping import Base, add_layers, base_of
 from gibiane_ops.values.maillage import Maillage, Point
+from gibiane_ops.values.middles import middles_of
 
 COUNT = Arg("n", ENTIER, "number of layers", optional=True)
 DINI = Key("DINI", "size of the first layer", Arg("d", FLOTTANT))
@@ -59,45 +63,52 @@ def _end_sizes(
     return (near if dini is None else dini), ((near if far is None else far) if dfin is None else dfin)
 
 
-def _sweep(ctx: Context, line: Maillage, layers: IntArray, base: IntArray, extended: Maillage | None) -> Maillage:
+def _sweep(ctx: Context, base: Base, layers: IntArray, extended: Maillage | None) -> Maillage:
     """Make the surface between the images of a line, its sides recorded; put a surface that it prolongs before it."""
+    line = base.mesh
     segments = line.blocks[0].cells
-    _, cells = sweep.sweep_cells("SEG2", np.searchsorted(base, segments), layers)
+    _, cells = sweep.sweep_cells("SEG2", np.searchsorted(base.corners, segments), layers)
+    blocks = elements(ctx, cells, base.quadratic)
     walked = segments if chains.is_chain(segments) else segments[chains.walk(segments)]
     if not chains.is_chain(walked):
-        return new_mesh(ctx, elements(ctx, cells))
-    grid = layers[:, np.searchsorted(base, chains.chain_nodes(walked))]
+        return finished(ctx, new_mesh(ctx, blocks), base.quadratic)
+    grid = layers[:, np.searchsorted(base.corners, chains.chain_nodes(walked))]
     sides = {
         "1": line,
         "2": line_between(ctx, grid[:, -1]),
         "3": line_between(ctx, grid[-1, ::-1]),
         "4": line_between(ctx, grid[::-1, 0]),
     }
-    surface = new_mesh(ctx, elements(ctx, cells), sides)
-    if extended is None:
-        return surface
-    old = extended.sides
-    sides = {"1": old["1"], "2": join([old["2"], sides["2"]]), "3": sides["3"], "4": join([sides["4"], old["4"]])}
-    return join([extended, surface], sides)
+    parts = [new_mesh(ctx, blocks, sides)]
+    if extended is not None:
+        parts.insert(0, linear_mesh(ctx, extended))
+    return finished(ctx, _assembled(parts), base.quadratic)
 
 
-def elements(ctx: Context, cells: IntArray) -> list[tuple[str, IntArray]]:
+def _assembled(parts: Sequence[Maillage]) -> Maillage:
+    """Put surfaces that prolong one another together, with the sides of the whole."""
+    if len(parts) == 1:
+        return parts[0]
+    return join(
+        parts,
+        {
+            "1": parts[0].sides["1"],
+            "2": join([part.sides["2"] for part in parts]),
+            "3": parts[-1].sides["3"],
+            "4": join([part.sides["4"] for part in reversed(parts)]),
+        },
+    )
+
+
+def elements(ctx: Context, cells: IntArray, quadratic: bool) -> list[tuple[str, IntArray]]:
     """Turn quadrangles into elements of the type of OPTI ELEM; those with a corner twice become triangles."""
     quadrangles, triangles = degenerate.split_off_triangles(cells)
     if surface_shape(ctx) == "TRI3":
         cut = sweep.split_quadrangles(nodes_of(ctx).coords, quadrangles)
+        if quadratic:
+            bend_diagonals(ctx, quadrangles, cut)
         return [("TRI3", np.concatenate([cut, triangles]))]
     return [("QUA4", quadrangles), ("TRI3", triangles)]
-
-
-def _layers(
-    ctx: Context, base: IntArray, place: Callable[[float], FloatArray], places: FloatArray, sizes: tuple[float, float]
-) -> IntArray:
-    """Add the nodes of the layers after the first; return all ids, (n_layers + 1, n_base)."""
-    images = np.concatenate([place(float(t)) for t in places[1:]])
-    density = np.repeat(sizes[0] + places[1:] * (sizes[1] - sizes[0]), len(base))
-    new = nodes_of(ctx).add(images, density).reshape(-1, len(base))
-    return np.concatenate([base[None], new])
 
 
 TRAN = operator(
@@ -117,13 +128,13 @@ TRAN = operator(
 def _translation(
     ctx: Context, line: Maillage, n: int | None, dini: float | None, dfin: float | None, v: Point
 ) -> Maillage:
-    surface_shape(ctx)
-    base, extended = _start(ctx, line)
-    vector, nodes = v.coords, base.nodes
-    sizes = _end_sizes(ctx, nodes, dini, dfin, float(v.store.density[v.node]) or None)
+    dimension(ctx)
+    start, extended = _start(ctx, line)
+    base, vector = base_of(ctx, start), v.coords
+    sizes = _end_sizes(ctx, base.corners, dini, dfin, float(v.store.density[v.node]) or None)
     places = places_along(ctx, float(np.linalg.norm(vector)), *sizes, n)
-    x = nodes_of(ctx).coords[nodes]
-    return _sweep(ctx, base, _layers(ctx, nodes, lambda t: x + t * vector, places, sizes), nodes, extended)
+    x = base.places
+    return _sweep(ctx, base, add_layers(ctx, base, lambda t: x + t * vector, places, sizes), extended)
 
 
 ROTA = operator(
@@ -158,16 +169,16 @@ def _rotation(
     a: Point,
     b: Point | None,
 ) -> Maillage:
-    surface_shape(ctx)
-    base, extended = _start(ctx, line)
-    axis, nodes = axis_end(ctx, a, b), base.nodes
-    x = nodes_of(ctx).coords[nodes]
-    sizes = _end_sizes(ctx, nodes, dini, dfin)
+    dimension(ctx)
+    start, extended = _start(ctx, line)
+    base, axis = base_of(ctx, start), axis_end(ctx, a, b)
+    x = base.places
+    sizes = _end_sizes(ctx, base.corners, dini, dfin)
     with explained(ctx, "a"):
-        radius = float(arcs.distance_to_axis(x, a.coords, axis).mean())
+        radius = float(arcs.distance_to_axis(x[: len(base.corners)], a.coords, axis).mean())
         places = places_along(ctx, abs(float(np.radians(angle))) * radius, *sizes, n)
-        layers = _layers(ctx, nodes, lambda t: transforms.rotation(angle * t, a.coords, axis)(x), places, sizes)
-    return _sweep(ctx, base, layers, nodes, extended)
+        layers = add_layers(ctx, base, lambda t: transforms.rotation(angle * t, a.coords, axis)(x), places, sizes)
+    return _sweep(ctx, base, layers, extended)
 
 
 REGL = operator(
@@ -187,10 +198,12 @@ REGL = operator(
 def _regler(
     ctx: Context, line: Maillage, n: int | None, dini: float | None, dfin: float | None, last: Maillage
 ) -> Maillage:
-    surface_shape(ctx)
+    dimension(ctx)
     store = nodes_of(ctx)
     first, before = _start(ctx, line)
     second, after = _start(ctx, last, "last", "1")
+    quadratic = wants_quadratic(ctx, first, second)
+    first, second = linear_mesh(ctx, first), linear_mesh(ctx, second)
     a, b = line_nodes(ctx, first, "line"), line_nodes(ctx, second, "last")
     if len(a) != len(b):
         ctx.fail(
@@ -201,52 +214,58 @@ def _regler(
             second=len(b) - 1,
             label="{second} elements",
         )
-    x0, x1 = store.coords[a], store.coords[b]
-    gap = np.linalg.norm(x1 - x0, axis=1)
+    gap = np.linalg.norm(store.coords[b] - store.coords[a], axis=1)
     sizes = _end_sizes(ctx, a, dini, dfin, float(store.density[b].mean()))
     places = places_along(ctx, float(gap.mean()), *sizes, n)
-    grid = sweep.ruled_layers(x0, x1, places)
+    if quadratic:
+        a, b, places = every_node(ctx, a), every_node(ctx, b), _halved(places)
+    grid = sweep.ruled_layers(store.coords[a], store.coords[b], places)
     fixed = np.concatenate([a[None], np.full((len(places) - 2, len(a)), -1, np.int64), b[None]])
     if a[0] == a[-1] and b[0] == b[-1]:
         fixed[1:-1, -1] = -2
     fixed[:, a == b] = a[a == b]
-    return _patch(ctx, grid, fixed, sizes, places, before, after)
+    surface = _patch(ctx, grid, fixed, sizes, places, quadratic)
+    neighbours = [None if part is None else linear_mesh(ctx, part) for part in (before, after)]
+    parts = [part for part in (neighbours[0], surface, neighbours[1]) if part is not None]
+    return finished(ctx, _assembled(parts), quadratic)
+
+
+def _halved(places: FloatArray) -> FloatArray:
+    """Put the middles between places, (m + 1,) to (2 m + 1,)."""
+    result = np.empty(2 * len(places) - 1)
+    result[::2], result[1::2] = places, (places[1:] + places[:-1]) / 2
+    return result
 
 
 def _patch(
-    ctx: Context,
-    grid: FloatArray,
-    ids: IntArray,
-    sizes: tuple[float, float],
-    places: FloatArray,
-    before: Maillage | None,
-    after: Maillage | None,
+    ctx: Context, grid: FloatArray, ids: IntArray, sizes: tuple[float, float], places: FloatArray, quadratic: bool
 ) -> Maillage:
-    """Make a surface of a grid: nodes of id -1 are added, -2 is the first of the row; join it to its neighbours."""
+    """Make a surface of first degree of a grid: nodes of id -1 are added, -2 is the first of the row.
+
+    In second degree every other row and column holds mid-nodes.
+    """
     new = ids == -1
+    if quadratic:
+        new[1::2, 1::2] = False
     density = np.broadcast_to((sizes[0] + places * (sizes[1] - sizes[0]))[:, None], ids.shape)
     ids[new] = nodes_of(ctx).add(grid[new], density[new])
     seam = ids[:, -1] == -2
     ids[seam, -1] = ids[seam, 0]
+    corners = ids
+    if quadratic:
+        corners = ids[::2, ::2]
+        for first, middle, last in (
+            (ids[::2, :-1:2], ids[::2, 1::2], ids[::2, 2::2]),
+            (ids[:-1:2, ::2], ids[1::2, ::2], ids[2::2, ::2]),
+        ):
+            middles_of(ctx).record(np.stack([first.ravel(), last.ravel()], axis=1), middle.ravel())
     sides = {
-        "1": line_between(ctx, ids[0]),
-        "2": line_between(ctx, ids[:, -1]),
-        "3": line_between(ctx, ids[-1][::-1]),
-        "4": line_between(ctx, ids[::-1, 0]),
+        "1": line_between(ctx, corners[0]),
+        "2": line_between(ctx, corners[:, -1]),
+        "3": line_between(ctx, corners[-1][::-1]),
+        "4": line_between(ctx, corners[::-1, 0]),
     }
-    surface = new_mesh(ctx, elements(ctx, _grid_cells(ids)), sides)
-    parts = [part for part in (before, surface, after) if part is not None]
-    if len(parts) == 1:
-        return surface
-    return join(
-        parts,
-        {
-            "1": parts[0].sides["1"],
-            "2": join([part.sides["2"] for part in parts]),
-            "3": parts[-1].sides["3"],
-            "4": join([part.sides["4"] for part in reversed(parts)]),
-        },
-    )
+    return new_mesh(ctx, elements(ctx, _grid_cells(corners), quadratic), sides)
 
 
 def _grid_cells(ids: IntArray) -> IntArray:
@@ -277,12 +296,18 @@ DALL = operator(
     gives=[MAILLAGE],
 )
 def _daller(ctx: Context, l1: Maillage, l2: Maillage, l3: Maillage, l4: Maillage, on: Any) -> Maillage:
-    surface_shape(ctx)
+    dimension(ctx)
     store = nodes_of(ctx)
+    quadratic = wants_quadratic(ctx, l1, l2, l3, l4)
+    l1, l2, l3, l4 = (linear_mesh(ctx, line) for line in (l1, l2, l3, l4))
     lines = [line_nodes(ctx, line, name) for line, name in ((l1, "l1"), (l2, "l2"), (l3, "l3"), (l4, "l4"))]
     bottom, right, top, left = _contour(ctx, lines)
     if len(bottom) != len(top) or len(right) != len(left):
-        return _transition(ctx, [bottom, right, top, left], on)
+        return finished(ctx, _transition(ctx, [bottom, right, top, left], on), quadratic)
+    density = store.density
+    sizes = float(density[bottom].mean()), float(density[top].mean())
+    if quadratic:
+        bottom, right, top, left = (every_node(ctx, side) for side in (bottom, right, top, left))
     top, left = top[::-1], left[::-1]
     x = store.coords
     grid = transfinite.patch(x[bottom], x[right], x[top], x[left])
@@ -290,9 +315,7 @@ def _daller(ctx: Context, l1: Maillage, l2: Maillage, l3: Maillage, l4: Maillage
         grid[1:-1, 1:-1] = _put_on(ctx, on[0], [p.coords for p in on[1]], grid[1:-1, 1:-1], x[bottom[0]])
     ids = np.full(grid.shape[:2], -1, np.int64)
     ids[0], ids[-1], ids[:, 0], ids[:, -1] = bottom, top, left, right
-    density = store.density
-    sizes = float(density[bottom].mean()), float(density[top].mean())
-    return _patch(ctx, grid, ids, sizes, np.linspace(0.0, 1.0, len(left)), None, None)
+    return finished(ctx, _patch(ctx, grid, ids, sizes, np.linspace(0.0, 1.0, len(left)), quadratic), quadratic)
 
 
 def _transition(ctx: Context, sides: list[IntArray], on: Any) -> Maillage:

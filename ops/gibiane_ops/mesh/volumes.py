@@ -17,7 +17,6 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.mesh import arcs, orientation, sweep, transforms
 from gibiane_ops.mesh.building import (
     DIMENSION,
-    SURFACES,
     axis_end,
     dimension,
     explained,
@@ -29,8 +28,11 @@ from gibiane_ops.mesh.building import (
     reference,
     reversed_mesh,
 )
+from gibiane_ops.mesh.degree import every_node, finished, linear_mesh
+from gibiane_ops.mesh.sweeping import Base, add_layers, base_of
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
+from gibiane_ops.values.middles import middles_of
 
 BoolArray = NDArray[np.bool_]
 
@@ -61,7 +63,7 @@ def _base(ctx: Context, mesh: Maillage, at: str, face: str) -> tuple[Maillage, M
     """Return the surface to sweep, and the volume that it prolongs if one was given."""
     if dimension(ctx) != 3:
         ctx.fail(34, "volumes exist in three dimensions only", hint="OPTI DIME 3 ELEM CUB8 ;")
-    if mesh.shapes and all(name in SURFACES for name in mesh.shapes):
+    if mesh.shapes and all(DIMENSION[name] == 2 for name in mesh.shapes):
         return mesh, None
     if not any(DIMENSION[name] == 3 for name in mesh.shapes):
         ctx.fail(
@@ -96,7 +98,7 @@ def _sizes(
 
 def _sweep(
     ctx: Context,
-    surface: Maillage,
+    base: Base,
     place: Callable[[float], FloatArray],
     places: FloatArray,
     sizes: tuple[float, float],
@@ -104,20 +106,12 @@ def _sweep(
     end: IntArray | None = None,
     after: Maillage | None = None,
 ) -> Maillage:
-    """Make the volume between the images of a surface; `end` gives the nodes of the last image if they exist."""
-    store, base = nodes_of(ctx), surface.nodes
-    inner = places[1:] if end is None else places[1:-1]
-    layers = [base[None]]
-    if len(inner):
-        images = np.concatenate([place(float(t)) for t in inner])
-        density = np.repeat(sizes[0] + inner * (sizes[1] - sizes[0]), len(base))
-        layers.append(store.add(images, density).reshape(-1, len(base)))
-    if end is not None:
-        layers.append(end[None])
-    ids = np.concatenate(layers)
+    """Make the volume between the images of a surface; `end` gives the corners of the last image if they exist."""
+    store, surface = nodes_of(ctx), base.mesh
+    ids = add_layers(ctx, base, place, places, sizes, end)
     blocks, bottom, top, against = [], [], [], []
     for block in surface.blocks:
-        local = np.searchsorted(base, block.cells)
+        local = np.searchsorted(base.corners, block.cells)
         name, cells = sweep.sweep_cells(block.shape, local, ids)
         turned = geometry.measures(shape(name), store.coords[cells]) < 0
         cells[turned] = orientation.reversed_cells(name, cells[turned])
@@ -129,14 +123,18 @@ def _sweep(
         with explained(ctx, "s"):
             geometry.check_cells(shape(name), store.coords[cells])
         blocks.append((name, cells))
-    around = _around(surface, np.concatenate(against), base, ids)
+    around = _around(surface, np.concatenate(against), base.corners, ids)
     faces = {"1": new_mesh(ctx, bottom), "2": new_mesh(ctx, top), "3": new_mesh(ctx, around)}
-    volume_mesh = new_mesh(ctx, blocks, faces)
-    parts = [part for part in (extended, volume_mesh, after) if part is not None]
+    parts = [new_mesh(ctx, blocks, faces)]
+    if extended is not None:
+        parts.insert(0, linear_mesh(ctx, extended))
+    if after is not None:
+        parts.append(linear_mesh(ctx, after))
     if len(parts) == 1:
-        return volume_mesh
+        return finished(ctx, parts[0], base.quadratic)
     lateral = join([part.sides["3"] for part in parts if "3" in part.sides])
-    return join(parts, {"1": parts[0].sides["1"], "2": parts[-1].sides["2"], "3": lateral})
+    whole = join(parts, {"1": parts[0].sides["1"], "2": parts[-1].sides["2"], "3": lateral})
+    return finished(ctx, whole, base.quadratic)
 
 
 def _outward(name: str, cells: IntArray, turn: BoolArray) -> IntArray:
@@ -160,11 +158,11 @@ def _translated(
     ctx: Context, s: Maillage, n: int | None, dini: float | None, dfin: float | None, prog: ListReel | None, tran: Point
 ) -> Maillage:
     surface, extended = _base(ctx, s, "s", "2")
-    vector, nodes = tran.coords, surface.nodes
-    sizes = _sizes(ctx, nodes, dini, dfin, float(tran.store.density[tran.node]) or None)
+    base, vector = base_of(ctx, surface), tran.coords
+    sizes = _sizes(ctx, base.corners, dini, dfin, float(tran.store.density[tran.node]) or None)
     places = _places(ctx, float(np.linalg.norm(vector)), sizes, n, prog)
-    x = nodes_of(ctx).coords[nodes]
-    return _sweep(ctx, surface, lambda t: x + t * vector, places, sizes, extended)
+    x = base.places
+    return _sweep(ctx, base, lambda t: x + t * vector, places, sizes, extended)
 
 
 @VOLU.form(
@@ -194,23 +192,24 @@ def _rotated(
 ) -> Maillage:
     surface, extended = _base(ctx, s, "s", "2")
     angle, a, b = rota
-    axis, nodes = axis_end(ctx, a, b), surface.nodes
-    x = nodes_of(ctx).coords[nodes]
-    sizes = _sizes(ctx, nodes, dini, dfin)
-    radius = float(arcs.distance_to_axis(x, a.coords, axis).mean())
+    base, axis = base_of(ctx, surface), axis_end(ctx, a, b)
+    x = base.places
+    sizes = _sizes(ctx, base.corners, dini, dfin)
+    radius = float(arcs.distance_to_axis(x[: len(base.corners)], a.coords, axis).mean())
     places = _places(ctx, abs(float(np.radians(angle))) * radius, sizes, n, prog)
-    return _sweep(ctx, surface, lambda t: transforms.rotation(angle * t, a.coords, axis)(x), places, sizes, extended)
+    return _sweep(ctx, base, lambda t: transforms.rotation(angle * t, a.coords, axis)(x), places, sizes, extended)
 
 
 @VOLU.form(BASE, Key("GENE", "move along a line", Arg("line", MAILLAGE), required=True), gives=[MAILLAGE])
 def _generated(ctx: Context, s: Maillage, gene: Maillage) -> Maillage:
     surface, extended = _base(ctx, s, "s", "2")
-    store = nodes_of(ctx)
-    line = line_nodes(ctx, gene, "gene")
-    path = store.coords[line] - store.coords[line[0]]
-    x, rank = store.coords[surface.nodes], np.arange(len(line), dtype=np.float64)
-    density = float(store.density[line].mean())
-    return _sweep(ctx, surface, lambda t: x + path[round(t)], rank, (density, density), extended)
+    base, store = base_of(ctx, surface), nodes_of(ctx)
+    line = line_nodes(ctx, linear_mesh(ctx, gene), "gene")
+    rank, density = np.arange(len(line), dtype=np.float64), float(store.density[line].mean())
+    # Corners of the line are at whole ranks, its mid-nodes (those of a curve, if it has them) at halves.
+    steps = every_node(ctx, line) if base.quadratic else np.repeat(line, 2)[:-1]
+    x, path = base.places, store.coords[steps] - store.coords[line[0]]
+    return _sweep(ctx, base, lambda t: x + path[round(2 * t)], rank, (density, density), extended)
 
 
 @VOLU.form(
@@ -227,12 +226,14 @@ def _ruled(
 ) -> Maillage:
     first, extended = _base(ctx, s, "s", "2")
     second, after = _base(ctx, last, "last", "1")
-    store, base = nodes_of(ctx), first.nodes
-    end = _matching(ctx, first, second, base)
-    x0, x1 = store.coords[base], store.coords[end]
-    sizes = _sizes(ctx, base, dini, dfin, float(store.density[end].mean()))
-    places = _places(ctx, float(np.linalg.norm(x1 - x0, axis=1).mean()), sizes, n, prog)
-    return _sweep(ctx, first, lambda t: (1 - t) * x0 + t * x1, places, sizes, extended, end, after)
+    base, store = base_of(ctx, first), nodes_of(ctx)
+    end = _matching(ctx, base.mesh, linear_mesh(ctx, second), base.corners)
+    middles = middles_of(ctx).of(end[base.ends])
+    x0, x1 = base.places, store.coords[np.concatenate([end, middles])]
+    sizes = _sizes(ctx, base.corners, dini, dfin, float(store.density[end].mean()))
+    length = float(np.linalg.norm(x1 - x0, axis=1)[: len(end)].mean())
+    places = _places(ctx, length, sizes, n, prog)
+    return _sweep(ctx, base, lambda t: (1 - t) * x0 + t * x1, places, sizes, extended, end, after)
 
 
 def _matching(ctx: Context, first: Maillage, second: Maillage, base: IntArray) -> IntArray:

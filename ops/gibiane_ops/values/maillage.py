@@ -11,8 +11,46 @@ from gibiane.fortran import general
 from gibiane.values import MAILLAGE, POINT, Value
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore
 
-COLOURS = ("DEFA", "BLEU", "ROUG", "ROSE", "VERT", "TURQ", "JAUN", "BLAN", "NOIR", "VIOL", "ORAN", "AZUR", "OCEA",
-           "CYAN", "OLIV", "GRIS")
+COLOURS = (
+    "DEFA",
+    "BLEU",
+    "ROUG",
+    "ROSE",
+    "VERT",
+    "TURQ",
+    "JAUN",
+    "BLAN",
+    "NOIR",
+    "VIOL",
+    "ORAN",
+    "AZUR",
+    "OCEA",
+    "CYAN",
+    "OLIV",
+    "GRIS",
+)
+
+# Order in which scripts give and see the nodes of elements of second degree: corners and mid-nodes in turn, as in
+# Cast3M, layer after layer. Inside, corners come first.
+IN_TURN: dict[str, tuple[int, ...]] = {
+    "SEG3": (0, 2, 1),
+    "TRI6": (0, 3, 1, 4, 2, 5),
+    "QUA8": (0, 4, 1, 5, 2, 6, 3, 7),
+    "TE10": (0, 4, 1, 5, 2, 6, 7, 8, 9, 3),
+    "PY13": (0, 5, 1, 6, 2, 7, 3, 8, 9, 10, 11, 12, 4),
+    "PR15": (0, 6, 1, 7, 2, 8, 12, 13, 14, 3, 9, 4, 10, 5, 11),
+    "CU20": (0, 8, 1, 9, 2, 10, 3, 11, 16, 17, 18, 19, 4, 12, 5, 13, 6, 14, 7, 15),
+}
+
+
+def cells_in_turn(shape: str, cells: IntArray) -> IntArray:
+    """Put the nodes of elements in the order that scripts see."""
+    return cells[:, list(IN_TURN[shape])] if shape in IN_TURN else cells
+
+
+def cells_from_turn(shape: str, cells: IntArray) -> IntArray:
+    """Put the nodes of elements, in the order that scripts give, corners first."""
+    return cells[:, np.argsort(IN_TURN[shape])] if shape in IN_TURN else cells
 
 
 class Point(Value):
@@ -117,7 +155,7 @@ class Maillage(Value):
         """Return the distinct nodes in order of first appearance (the order along a line)."""
         if not self.blocks:
             return np.zeros(0, np.int64)
-        flat = np.concatenate([b.cells.ravel() for b in self.blocks])
+        flat = np.concatenate([cells_in_turn(b.shape, b.cells).ravel() for b in self.blocks])
         _, first = np.unique(flat, return_index=True)
         return flat[np.sort(first)]
 
@@ -152,7 +190,7 @@ class Maillage(Value):
                 rows = slice(start, start + 15)
                 yield _row([str(i + 1) for i in range(start, min(start + 15, len(block.cells)))])
                 yield _row([COLOURS[c] for c in block.colours[rows]])
-                for local in block.cells[rows].T:
+                for local in cells_in_turn(block.shape, block.cells[rows]).T:
                     yield _row([str(n + 1) for n in local])
 
 

@@ -5,58 +5,72 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.values.nodes import NodeStore, node_store
 
+BoolArray = NDArray[np.bool_]
+
+
+def _keys(ends: IntArray) -> IntArray:
+    """Return one number per edge, the same from both ends; they sort as the pairs of sorted ends do."""
+    return np.asarray(ends.min(axis=1) << 32 | ends.max(axis=1), np.int64)
+
 
 class Middles:
-    """Mid-nodes by edge.
-
-    Attributes
-    ----------
-    ends : (k, 2) int64
-        Ends of the edges, the smaller id first, rows sorted.
-    middles : (k,) int64
-    """
+    """Mid-nodes by edge: a sorted array of edges, and the node in the middle of each."""
 
     def __init__(self, store: NodeStore) -> None:
         self.store = store
         self._version = store.version
-        self._ends = np.zeros((0, 2), np.int64)
+        self._edges = np.zeros(0, np.int64)
         self._middles = np.zeros(0, np.int64)
 
-    @property
-    def ends(self) -> IntArray:
-        """Ends of the edges, after merges of nodes."""
-        self._refresh()
-        return self._ends
-
-    @property
-    def middles(self) -> IntArray:
-        """Mid-nodes of the edges, after merges of nodes."""
-        self._refresh()
-        return self._middles
-
     def _refresh(self) -> None:
-        if self._version != self.store.version:
-            self._version = self.store.version
-            self._keep(self.store.canonical(self._ends), self.store.canonical(self._middles))
-
-    def _keep(self, ends: IntArray, middles: IntArray) -> None:
-        """Store edges sorted; of two mid-nodes of one edge the first known stays."""
-        self._ends, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
-        self._middles = middles[first]
+        """Follow merges of nodes; of two mid-nodes that an edge then has, the first made stays."""
+        if self._version == self.store.version:
+            return
+        self._version = self.store.version
+        ends = self.store.canonical(np.stack([self._edges >> 32, self._edges & 0xFFFFFFFF], axis=1))
+        middles = self.store.canonical(self._middles)
+        order = np.lexsort((middles, _keys(ends)))
+        order = order[ends[order, 0] != ends[order, 1]]
+        self._edges, first = np.unique(_keys(ends[order]), return_index=True)
+        self._middles = middles[order[first]]
 
     def record(self, ends: IntArray, middles: IntArray) -> None:
-        """Say which nodes stand in the middle of edges, for instance on a curve.
+        """Say which nodes stand in the middle of edges, for instance on a curve, whatever stood there before.
 
         Parameters
         ----------
         ends : (k, 2) int64
+            An edge whose ends are one node is left out; of repeated ones the last counts.
         middles : (k,) int64
         """
-        self._keep(np.concatenate([self.ends, ends]), np.concatenate([self.middles, middles]))
+        self._refresh()
+        real = ends[:, 0] != ends[:, 1]
+        edges, last = np.unique(_keys(ends[real])[::-1], return_index=True)
+        if not len(edges):
+            return
+        fresh = middles[real][::-1][last]
+        place = np.searchsorted(edges, self._edges)
+        stay = edges[np.minimum(place, len(edges) - 1)] != self._edges
+        every = np.concatenate([self._edges[stay], edges])
+        order = np.argsort(every, kind="stable")
+        self._edges = every[order]
+        self._middles = np.concatenate([self._middles[stay], fresh])[order]
+
+    def known(self, ends: IntArray) -> BoolArray:
+        """Tell which edges, (k, 2), have a mid-node already."""
+        self._refresh()
+        return self._find(_keys(ends))[1]
+
+    def _find(self, edges: IntArray) -> tuple[IntArray, BoolArray]:
+        if not len(self._edges):
+            return np.zeros(len(edges), np.int64), np.zeros(len(edges), bool)
+        place = np.minimum(np.searchsorted(self._edges, edges), len(self._edges) - 1)
+        return place, self._edges[place] == edges
 
     def of(self, ends: IntArray) -> IntArray:
         """Return the mid-nodes of edges, made at their middle when there are none yet.
@@ -70,18 +84,34 @@ class Middles:
         -------
         (k,) int64
         """
-        wanted, place = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-        every = np.concatenate([self.ends, wanted])
-        _, row, inverse = np.unique(every, axis=0, return_index=True, return_inverse=True)
-        known = row[inverse[len(self.ends) :]]
-        result = np.full(len(wanted), -1, np.int64)
-        old = known < len(self.ends)
-        result[old] = self.middles[known[old]]
-        new = wanted[~old]
-        x: FloatArray = self.store.coords[new].mean(axis=1)
-        result[~old] = self.store.add(x, self.store.density[new].mean(axis=1))
-        self.record(new, result[~old])
-        return result[place.ravel()]
+        self._refresh()
+        wanted, inverse = np.unique(_keys(ends), return_inverse=True)
+        place, old = self._find(wanted)
+        result = np.empty(len(wanted), np.int64)
+        if old.any():
+            result[old] = self._middles[place[old]]
+        new = np.stack([wanted[~old] >> 32, wanted[~old] & 0xFFFFFFFF], axis=1)
+        result[~old] = self.add(new, self.store.coords[new].mean(axis=1))
+        return result[inverse.ravel()]
+
+    def add(self, ends: IntArray, places: FloatArray) -> IntArray:
+        """Make new mid-nodes of edges at given places.
+
+        Parameters
+        ----------
+        ends : (k, 2) int64
+            Each edge once.
+        places : (k, 3) float64, length
+
+        Returns
+        -------
+        (k,) int64
+        """
+        if not len(ends):
+            return np.zeros(0, np.int64)
+        nodes = self.store.add(places, self.store.density[ends].mean(axis=1))
+        self.record(ends, nodes)
+        return nodes
 
 
 def middles_of(owner: Any) -> Middles:
