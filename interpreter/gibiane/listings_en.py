@@ -17,6 +17,8 @@ ENGLISH: dict[str, str] = {
     " LISTREEL de pointeur {p} contenant {n} reel(s) que voici:": " LISTREEL with pointer {p} containing {n} real(s):",
     " LISTENTI de pointeur {p} contenant {n} entier(s) que voici:": " LISTENTI with pointer {p} containing {n} integer(s):",
     " LISTMOTS de pointeur {p} qui contient {n} mot(s) de {k} caractere(s)": " LISTMOTS with pointer {p} containing {n} word(s) of {k} character(s)",
+    " LISTCHPO de pointeur {p} contenant {n} champ(s) par points": " LISTCHPO with pointer {p} containing {n} nodal field(s)",
+    " LISTOBJE de pointeur {p} contenant {n} objet(s) {type}": " LISTOBJE with pointer {p} containing {n} object(s) {type}",
     " Liste des mots :": " List of words:",
     " EVOLUTIO de pointeur {p} contenant {n} courbe(s)": " EVOLUTIO with pointer {p} containing {n} curve(s)",
     " Courbe {n} : {title}  type {kind}  couleur {colour}": " Curve {n}: {title}  type {kind}  colour {colour}",

@@ -79,7 +79,8 @@ def _power(ctx: Context, a: Any, b: Any) -> Any:
 
 def _comparison(name: str, summary: str, holds: Callable[[Any, Any], bool]) -> Operator:
     op = infix(name, topic="logic", summary=summary, example=f"MESS (2 {name} 3.) ;",
-               notice="Compares two numbers; the result is a LOGIQUE.")
+               notice="Compares two numbers; the result is a LOGIQUE. With lists: does it hold for every value? "
+                      "MASQ tells for which ones.")
 
     @op.form(A, B, gives=[LOGIQUE])
     def _compare(ctx: Context, a: Any, b: Any) -> bool:

@@ -1,9 +1,8 @@
-"""Lists are built: PROG, LECT, MOTS, VIDE."""
+"""Lists are built: PROG, LECT, MOTS."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,13 @@ from gibiane.values import (
     LISTENTI,
     LISTMOTS,
     LISTREEL,
-    LOGIQUE,
     MOT,
     TABLE,
     Table,
 )
 from gibiane_ops.kernels.functions import FUNCTIONS
-from gibiane_ops.values.listes import AnyList, ListEnti, ListMots, ListReel
+from gibiane_ops.values.listes import ListEnti, ListMots, ListReel
 
-LISTS = (LISTREEL, LISTENTI, LISTMOTS)
 NUMBERS = (ENTIER, FLOTTANT)
 MAX_ITEMS = 50_000_000
 
@@ -297,67 +294,3 @@ def _mots(ctx: Context, q: Operands) -> ListMots:
         if word is ABSENT:
             return ListMots(words)
         words.extend([word] * count)
-
-
-VIDE = operator(
-    "VIDE",
-    topic="values",
-    summary="an empty object, or: is an object empty?",
-    notice="`VIDE 'TYPE'` makes an empty object of the type, `VIDE 'TYPE'*n` n of them, `'TYPE'/'SUBTYPE'` with a "
-    "subtype; 'TABU' puts them into a table, indexed from 1 or by the values of the list that follows. With an object "
-    "that is no word: VRAI if nothing is in it.",
-    example="L = VIDE 'LISTREEL' ; L = L ET 2. ; MESS (DIME L) (VIDE L) ;",
-    see=["DIMENSION", "EXISTE"],
-)
-EMPTY: dict[str, Callable[[str | None], Any]] = {
-    LISTREEL: lambda _subtype: ListReel([]),
-    LISTENTI: lambda _subtype: ListEnti([]),
-    LISTMOTS: lambda _subtype: ListMots([]),
-    TABLE: Table,
-}
-
-
-@VIDE.form(Arg("values", (*LISTS, TABLE), "list or table"), gives=[LOGIQUE])
-def _is_empty(ctx: Context, values: AnyList | Table) -> bool:
-    return not (values.entries if isinstance(values, Table) else len(values))
-
-
-@VIDE.stream(
-    Key(("TABU", "TABULER"), "into a table", name="table"),
-    gives=["TYPE..."],
-    last=True,
-    syntax="('TABU' (indices:LISTENTI|LISTREEL|LISTMOTS)) 'TYPE'(/'SUBTYPE')(*n)...",
-)
-def _make_empty(ctx: Context, q: Operands) -> Any:
-    indices: AnyList | None = None
-    tabulated = q.read_keyword(["TABULER"]) is not None
-    if tabulated:
-        indices = q.read(LISTS)
-    found: list[Any] = []
-    while q.values:
-        ctx.places["type"] = q.nodes[0]
-        kind = str(q.need(MOT, "the type of an empty object")).strip()[:8]
-        count, subtype = 1, None
-        while q.values and q.values[0] in ("*", "/"):
-            if q.values.pop(0) == "*":
-                del q.nodes[0]
-                count = q.need(ENTIER, "their number")
-            else:
-                del q.nodes[0]
-                subtype = q.need(MOT, "the subtype")
-        if kind not in EMPTY:
-            ctx.fail(
-                19,
-                "no empty {type} can be made",
-                at="type",
-                type=kind,
-                hint="known: {known}",
-                known=", ".join(sorted(EMPTY)),
-            )
-        found.extend(EMPTY[kind](subtype) for _ in range(count))
-    if not tabulated:
-        return tuple(found)
-    table = Table()
-    for number, value in enumerate(found):
-        table.set(indices.item(number) if indices is not None and number < len(indices) else number + 1, value)
-    return table

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
-from gibiane.values import ENTIER, FLOTTANT, LISTENTI, LISTREEL
+from gibiane.values import ENTIER, FLOTTANT, LISTENTI, LISTREEL, LOGIQUE
 from gibiane_ops.kernels.functions import FUNCTIONS
 from gibiane_ops.values.listes import ListEnti, ListReel
 
@@ -153,6 +153,16 @@ def _integer(ctx: Context, x: Numbers, how: str | None) -> ListEnti:
         ctx.fail(26, "value {number} has no integer value", at="x", number=number)
     return ListEnti(rounded)
 
+
+def _comparison(name: str, holds: Callable[[Any, Any], Any]) -> None:
+    @extend(name).form(A, B, gives=[LOGIQUE])
+    def _compare(ctx: Context, a: Any, b: Any) -> bool:
+        left, right = _pair(ctx, a, b)
+        return bool(np.all(holds(left, right)))
+
+
+for _symbol, _holds in {"<": np.less, ">": np.greater, "<EG": np.less_equal, ">EG": np.greater_equal}.items():
+    _comparison(_symbol, _holds)
 
 SOMM = operator(
     "SOMME",

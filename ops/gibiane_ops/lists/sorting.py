@@ -26,7 +26,8 @@ POSI = operator(
     topic="lists",
     summary="where a value stands in a list, or a text in a word",
     notice="The position of the first occurrence, 0 when there is none; 'TOUS' gives a LISTENTI of all. A "
-    "list of values gives the list of their first positions. Reals are equal to rounding, or within "
+    "list of values gives the list of their first positions, a mesh of points those of its points. Reals are equal to "
+    "rounding, or within "
     "the tolerance given after the list; 'NOCA' makes capital and small letters the same.",
     example="MESS (POSI 4. 'DANS' (PROG 2. 4. 6.)) ' ' (POSI 'c' 'DANS' 'abcd') ;",
     see=["EXISTE", "EXTRAIRE"],
@@ -160,7 +161,10 @@ ORDO = operator(
     notice="In increasing order, or 'DECR'; 'ABSO' compares absolute values, 'NOCA' words without regard to "
     "capitals. Further lists of the same length follow the first and give as many results. 'UNIQ' "
     "drops what is there twice (reals within a tolerance, if given). A TABLE of lists is sorted by "
-    "the one whose index is given.",
+    "the one whose index is given. 'COUT' puts the lists in the order j(i) of least cost, the sum of the costs "
+    "C(i, j(i)) in a list of n*n values, row after row; the first result is this cost. A curve is sorted by abscissae; "
+    "of a mesh the points by their distance to the first, segments end to end, other elements from neighbour to "
+    "neighbour.",
     example="L M = ORDO (PROG 3. 1. 2.) (MOTS 'C' 'A' 'B') ; LIST L ; LIST M ;",
     see=["UNIQUE"],
 )
@@ -180,6 +184,31 @@ def _order(values: AnyList, order: str | None, abso: bool, noca: bool) -> list[i
 def _permuted(values: AnyList, order: list[int]) -> AnyList:
     items = items_of(values)
     return like(values, [items[k] for k in order])
+
+
+@ORDO.form(
+    Arg("values", LISTS, "lists", many=True),
+    Key("COUT", "order of least cost", Arg("costs", (LISTREEL, LISTENTI)), required=True),
+    Key(("HONG", "COMP"), "method; both find the least cost", name="method"),
+    gives=["FLOTTANT|ENTIER", "LISTREEL|LISTENTI|LISTMOTS"],
+)
+def _assign(ctx: Context, values: list[AnyList], cout: ListReel | ListEnti, method: str | None) -> Any:
+    from scipy.optimize import linear_sum_assignment
+
+    _same_length(ctx, values)
+    size = len(values[0])
+    if len(cout) != size * size:
+        ctx.fail(
+            217,
+            "{count} costs for lists of {size} values: {wanted} are wanted",
+            at="cout",
+            count=len(cout),
+            size=size,
+            wanted=size * size,
+        )
+    costs = cout.values.reshape(size, size)
+    rows, columns = linear_sum_assignment(costs)
+    return costs[rows, columns].sum().item(), *(_permuted(v, columns.tolist()) for v in values)
 
 
 @ORDO.form(
@@ -234,7 +263,8 @@ UNIQ = operator(
     topic="lists",
     summary="lists without what is there twice",
     notice="Keeps the first occurrence of each value. Reals are equal to rounding, or within a tolerance; "
-    "'NOCA' makes capital and small letters the same. Several lists give as many results.",
+    "'NOCA' makes capital and small letters the same. Several lists give as many results. Elements of a mesh are the "
+    "same when they have the same nodes, with 'ORDO' in the same order.",
     example="L = UNIQ (LECT 3 1 3 2 1) ; LIST L ;",
     see=["ORDONNER"],
 )

@@ -1,0 +1,1 @@
+"""Curves: EVOL, EXTR, IPOL, INTG, and the operators of lists on ordinates."""
