@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 
 from gibiane.forms import Arg
 from gibiane.registry import Context, operator
@@ -22,6 +21,8 @@ EXTE = operator(
 
 @EXTE.form(Arg("command", (MOT, ENTIER, FLOTTANT), "words of the command", many=True))
 def _run(ctx: Context, command: list[str | int | float]) -> None:
+    import subprocess  # slow to import, and seldom asked for
+
     text = " ".join(str(word) for word in command)
     if not ctx.option("EXEC"):
         ctx.fail(
