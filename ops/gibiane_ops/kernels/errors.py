@@ -305,3 +305,43 @@ class TooLarge(KernelError):
 
     def __str__(self) -> str:
         return f"{self.what} would need {self.needed / 1e9:.3g} GB, the limit is {self.limit / 1e9:.3g} GB"
+
+
+@dataclass(eq=False)
+class NotEquilibrated(KernelError):
+    """A finite-element stress that does not balance the loads given with it.
+
+    Attributes
+    ----------
+    nodes : (k,) int64
+        Nodes where forces remain, the largest first.
+    forces : (k, d) float64
+        What remains there.
+    share : float
+        The largest of them over the largest nodal force of the stress.
+    """
+
+    nodes: IntArray
+    forces: FloatArray
+    share: float
+
+    def __str__(self) -> str:
+        return f"the stress leaves {self.share:.2%} of unbalanced force at nodes {_first(self.nodes)}"
+
+
+@dataclass(eq=False)
+class UnreadableFile(KernelError):
+    """A file of another format than expected, or one that was cut.
+
+    Attributes
+    ----------
+    path : str
+    reason : str
+        What is wrong with it.
+    """
+
+    path: str
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.reason}"
