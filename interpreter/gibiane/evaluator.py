@@ -129,8 +129,8 @@ class Evaluator:
         if not targets:
             if len(q.values) > 1:
                 raise faults.leftover(self, q, 1)
-            if len(q.values) == 1 and self.session.options["WARN"]:
-                faults.warn_lonely_word(self, q)
+            if len(q.values) == 1 and isinstance(q.values[0], str):
+                faults.lonely_word(self, q)
             return
         full = Operands(self.session, q.source, q.values[:], q.nodes[:]) if len(q.values) > len(targets) else None
         results = [self._result_for(target, q, instr) for target in targets]

@@ -201,14 +201,19 @@ def no_table(ev: Evaluator, target: Target, step: int, container: object, instr:
 # -- warnings of a session at the prompt --------------------------------------------------------------------------
 
 
-def warn_lonely_word(ev: Evaluator, q: Operands) -> None:
-    """Warn of a directive whose only value is a word that nothing has: the language drops it in silence."""
-    node = q.nodes[0]
-    if not isinstance(node, Name) or q.values[0] != node.word:
+def lonely_word(ev: Evaluator, q: Operands) -> None:
+    """Judge a directive whose only value is a word, which the language drops: refuse operators of Cast3M.
+
+    At the prompt, warn of a word that nothing has.
+    """
+    node, word = q.nodes[0], q.values[0]
+    if not isinstance(node, (Name, Literal)) or word != getattr(node, "word", word):
         return
-    missing = cast3m.meant(node.word)
-    if missing is not None:
+    missing = cast3m.meant(word)
+    if missing is not None and find(word) is None:
         raise GibianeError(q.not_available(0, *missing))
+    if not ev.session.options["WARN"] or not isinstance(node, Name):
+        return
     close = nearest(node.word, [*spellings(), *ev.session.names(), *ev.session.library.names()])
     ev.session.emit(
         make(

@@ -6,7 +6,7 @@ from typing import Any
 
 from gibiane.binding import Operands
 from gibiane.diagnostics import nearest
-from gibiane.forms import Arg
+from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, operator
 from gibiane.values import ANY, ENTIER, MOT, PREDEFINED, TABLE, Table, type_of
 
@@ -92,6 +92,26 @@ def _forget_name(ctx: Context, q: Any) -> None:
                  hint="did you mean {close}?" if close else None)
     q.take((ANY,))
     del ctx.session.evaluator.frame.names[name]
+
+
+DETR = operator("DETRUIRE", topic="values", summary="do nothing: an object nobody names any more is freed by itself",
+                notice="`DETR x` reads the object, and the word 'ELEM' of Cast3M, and leaves the object as it is.",
+                example="L = 3 ; DETR L ; MESS L ;", see=["OUBLIER", "MENAGE"])
+
+
+@DETR.form(Arg("x", ANY, "object"), Key("ELEM", "with its elements"))
+def _destroy(ctx: Context, x: Any, elem: bool) -> None:
+    return
+
+
+MENA = operator("MENAGE", topic="values", summary="do nothing: memory is freed by itself",
+                notice="Kept so that scripts of Cast3M run.", example="MENAGE ;", see=["DETRUIRE"])
+
+
+@MENA.form(Key("OBLI", "at once"))
+def _tidy(ctx: Context, obli: bool) -> None:
+    return
+
 
 
 COPI = operator("COPIER", topic="values", summary="copy an object", notice="A TABLE is copied one level deep.",

@@ -48,7 +48,9 @@ def test_what_is_usual_gives_no_warning(text: str, capsys: pytest.CaptureFixture
 
 
 def test_a_missing_name_of_cast3m_alone_in_an_instruction_is_an_error(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "error[251]: MENA of Cast3M is not available yet" in _shown("MENA ;", capsys, interactive=True)
+    for interactive in (True, False):
+        shown = _shown("OSCI ;", capsys, interactive=interactive)
+        assert "error[251]: OSCI of Cast3M is not available yet" in shown
 
 
 def test_messages_are_coloured_on_a_terminal_only() -> None:
