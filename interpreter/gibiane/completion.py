@@ -16,7 +16,7 @@ from gibiane.syntax import parse
 from gibiane.values import Table, type_of
 
 FILE_OPTIONS = frozenset({"ACQU", "SORT", "DONN", "SAUV", "REST", "FTRA", "LECT"})
-_WORD = re.compile(r"[A-Za-z0-9_@&!#?$]*$")
+_WORD = re.compile(r"[A-Za-z0-9_@&!#?$]*\Z")
 _CLOSING = {"FINS": "SI", "FINP": "DEBP", "FINM": "DEBM"}
 
 

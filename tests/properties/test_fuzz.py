@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from gibiane.check import problems
@@ -114,6 +114,7 @@ def test_words_in_any_order_are_run(text: str) -> None:
 
 @fuzz
 @given(st.one_of(any_text, broken_fragments()))
+@example(".TEXT;")
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer on this system")
 def test_broken_texts_are_run(text: str) -> None:
     _run(text)
@@ -132,6 +133,7 @@ SESSION.run_text("T = TABL ; T.'A' = 1 ; T.'A b' = 2 ; A = 3 ;", "fuzz")
 
 @fuzz
 @given(st.one_of(tokens_soup, any_text))
+@example("0\n")
 def test_what_is_typed_can_be_completed(text: str) -> None:
     incomplete(text)
     partial, found = candidates(SESSION, text)

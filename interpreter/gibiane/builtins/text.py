@@ -150,6 +150,8 @@ def _text(ctx: Context, q: Operands) -> Texte:
     while q.values:
         ctx.places["x"] = q.nodes[0]
         value, _ = q.take((ANY,))
+        if value is ABSENT:  # a separator that belongs to nothing
+            raise q.missing(MOT)
         piece = value.text if isinstance(value, Texte) else _image(value, DEFAULT)
         if piece is None:
             ctx.fail(39, "a {type} has no text image", at="x", type=type_of(value))

@@ -222,5 +222,11 @@ LANGUAGE = {
     "internal failure: {kind}: {text}": "défaillance interne : {kind} : {text}",
     "this is a fault of the program: please report it with this script (--debug shows more)": "c'est une faute du programme : merci de la signaler avec ce script (--debug en montre plus)",
     "{directive} does not read it: INFO {directive} ; tells what it reads": "{directive} ne le lit pas : INFO {directive} ; dit ce qu'il lit",
+    "the command ended with code {status}: '{command}'": "la commande a fini avec le code {status} : '{command}'",
+    "commands of the system are not run: '{command}'": "les commandes du système ne sont pas exécutées : '{command}'",
+    "start with gibiane --allow-exec if you trust the script": "lancer gibiane --allow-exec si le script est sûr",
+    "a TEXTE contains itself": "un TEXTE se contient lui-même",
+    "a number of {length} characters": "un nombre de {length} caractères",
+    "at most {most} are read": "{most} au plus sont lus",
     "{directive} gives no result: write it without {name} =": "{directive} ne donne pas de résultat : ôter {name} =",
 }
