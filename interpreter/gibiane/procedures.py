@@ -92,8 +92,8 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
     return found
 
 
-def define_all(ev: Evaluator, source: SourceText) -> list[Instr]:
-    """Define every procedure of a file in the session; return the instructions of the file."""
+def define_all(ev: Evaluator, source: SourceText, only: str | None = None) -> list[Instr]:
+    """Define every procedure of a file in the session, or that of one name; return the instructions of the file."""
     program = parse(source)
     slips.mark(source, program)
     annotate(program)
@@ -108,10 +108,36 @@ def define_all(ev: Evaluator, source: SourceText) -> list[Instr]:
                 raise GibianeError(instr.bad)
             if instr.head not in ("DEBP", "DEBM"):
                 raise GibianeError(make(1031, "a procedure file holds procedures only", span=instr.span()))
-            pc = define(ev, program, pc)
+            named = [_word(item) for item in instr.items if _word(item) is not None][1:2]
+            wanted = only is None or instr.jump is None or [only] == [str(word).upper() for word in named]
+            pc = define(ev, program, pc) if wanted else instr.jump + 1  # type: ignore[operator]
     finally:
         ev.frame = outer
     return program
+
+
+def import_file(ev: Evaluator, source: SourceText, name: str | None) -> None:
+    """Define the procedures of a file (LIRE 'PROC'), or make one, `name`, of a file that holds no DEBP."""
+    program = parse(source)
+    if any(instr.head in ("DEBP", "DEBM") for instr in program):
+        define_all(ev, source, name)
+        if name is not None and not isinstance(ev.session.globals.names.get(name), Procedure):
+            raise GibianeError(make(9, "{file} defines no procedure {name}", file=source.name, name=name))
+        return
+    if name is None:
+        raise GibianeError(make(37, "{file} defines no procedure: the name of the one it becomes is wanted",
+                                file=source.name, hint="LIRE 'PROC' 'file' 'NAME' ;"))
+    slips.mark(source, program)
+    whole = [*parse(SourceText(source.name, f"DEBP {name} ;")), *program, *parse(SourceText(source.name, "FINP ;"))]
+    annotate(whole)
+    for instr in program:
+        if instr.bad is not None:
+            raise GibianeError(instr.bad)
+    outer, ev.frame = ev.frame, ev.session.globals
+    try:
+        define(ev, whole, 0)
+    finally:
+        ev.frame = outer
 
 
 def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:

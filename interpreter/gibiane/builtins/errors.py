@@ -4,29 +4,32 @@ from __future__ import annotations
 
 from typing import Any
 
-from gibiane.diagnostics import GibianeError, Text, level_of, make
+from gibiane.diagnostics import ERROR, GibianeError, Text, make
+from gibiane.error_texts import TEXTS, UNKNOWN
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ANY, ENTIER, MOT
 
 ERRE = operator("ERREUR", topic="errors", summary="raise an error, or estimate the error of a solution",
-                notice="Directive: `ERRE 0` does nothing, `ERRE n` raises error n (5 is fatal: how tests fail), "
-                       "`ERRE 'text'` writes the text and raises error 308. OPTI ERRE says what an error does. "
+                notice="Directive: `ERRE 0` does nothing, `ERRE n` raises error n with its text and level (5 is fatal: how "
+                       "tests fail; 'AVEC' adds values), `ERRE 'text'` writes the text and raises error 308. OPTI "
+                       "ERRE says what an error does. "
                        "Operator: with a model, a stress field and a material, the error indicator.",
                 example="OPTI ERRE IGNO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;", see=["OPTION"])
 
 
 @ERRE.form(Arg("n", ENTIER, "number of the error"), Key("AVEC", "values for its text", Arg("x", ANY, many=True)))
 def _raise(ctx: Context, n: int, avec: list[Any] | None) -> None:
-    if n == 0:
-        return
-    sentence = Text("a test of this script failed" if n == 5 else "raised by the script")
-    values = ", ".join(ctx.session.brief(v) for v in avec or [])
-    diagnostic = make(n, "{sentence} ({values})", operator="ERREUR", span=ctx.operands.span(ctx.node),
-                      sentence=sentence, values=values, level=level_of(str(n)))
-    if not avec:
-        diagnostic.sentence = sentence
-    raise GibianeError(diagnostic)
+    sentence = TEXTS.get(n, UNKNOWN)
+    if avec:
+        values = ", ".join(ctx.session.brief(v) for v in avec)
+        sentence = Text("{sentence} ({values})", {"sentence": sentence, "values": values})
+    diagnostic = make(n, "raised by the script", operator="ERREUR", span=ctx.operands.span(ctx.node))
+    diagnostic.sentence = sentence
+    if diagnostic.level >= ERROR:
+        raise GibianeError(diagnostic)
+    if n != 0:
+        ctx.session.emit(diagnostic)
 
 
 @ERRE.form(Arg("text", MOT, "text to show"), last=True)

@@ -102,7 +102,10 @@ def _different(ctx: Context, q: Operands) -> bool:
 
 
 TYPE = operator("TYPE", topic="values", summary="type of an object, as a word of 8 letters", terminal=True,
-                notice="The name of the type, padded with blanks to 8 letters.", example="MESS (TYPE 2E5) ;")
+                notice="The name of the type, padded with blanks to 8 letters. ENTIER, FLOTTANT, MOT, TABLE, POINT and others "
+                       "are names of operators too, which a word that stands first runs: write EGA (TYPE X) 'ENTIER', and "
+                       "let a procedure give the comparison, or the word in a TABLE, but not FINP (TYPE X).",
+                example="MESS (TYPE 2E5) ; MESS (EGA (TYPE 3) 'ENTIER') ;")
 
 
 @TYPE.form(Arg("x", ANY, "object"), gives=[MOT])

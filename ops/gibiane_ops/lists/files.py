@@ -13,7 +13,9 @@ from gibiane.binding import Operands
 from gibiane.builtins.text import output_path, write_text
 from gibiane.forms import Arg, Key
 from gibiane.fortran import scientific
+from gibiane.library import read_script
 from gibiane.nodes import Name
+from gibiane.procedures import import_file
 from gibiane.registry import Context, extend, operator
 from gibiane.source import decode
 from gibiane.values import (
@@ -200,15 +202,30 @@ def _obtain(ctx: Context, q: Operands) -> None:
 LIRE = operator(
     "LIRE",
     topic="files",
-    summary="read a file: a table of numbers",
+    summary="read a file: a table of numbers, procedures",
     notice="'CSV': a TABLE of LISTREEL, one per column ('COLO', the usual) or per line ('LIGN'). 'SEPA' is "
     "the separator (a semicolon), 'DEBU' and 'FIN' the first and last line read. When the first line "
     "holds no numbers, its words are the indices of the columns; for lines they are a LISTMOTS at "
-    "index 1.",
+    "index 1. 'PROC' defines the procedures of a file, or the one that is named; a file without DEBP becomes the "
+    "procedure of this name.",
     example="OPTI 'SORT' 'curve' ; T = TABL ; T.'X' = PROG 1. 2. ; SORT 'EXCE' T ; "
     "U = LIRE 'CSV' 'curve.csv' ; LIST (U.'X') ;",
     see=["ACQUERIR", "SORTIR"],
 )
+
+
+@LIRE.form(
+    Key(
+        "PROC",
+        "procedures of a file",
+        Arg("file", MOT, "its name"),
+        Arg("name", MOT, "name of one of them", optional=True),
+        required=True,
+    )
+)
+def _procedures(ctx: Context, proc: tuple[str, str | None]) -> None:
+    path, name = proc
+    import_file(ctx.session.evaluator, read_script(Path(path)), None if name is None else name.strip().upper())
 
 
 @LIRE.form(
