@@ -56,6 +56,8 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     # lists
     "SORTIR": ("gibiane_ops.lists.files", "gibiane_ops.output.files", "gibiane_ops.exchange.writing"),
     "LIRE": ("gibiane_ops.lists.files", "gibiane_ops.exchange.reading"),
+    "SAUVER": ("gibiane_ops.exchange.sessions",),
+    "RESTITUER": ("gibiane_ops.exchange.sessions",),
     "OBTENIR": ("gibiane_ops.lists.files",),
     "ACQUERIR": ("gibiane_ops.lists.files",),
     "IPOL": ("gibiane_ops.curves.interpolating",),

@@ -205,8 +205,8 @@ class Archive:
         BadArchive
             When the content is not what this package writes.
         """
-        reader = _Reader(self._content["objects"], self._arrays, store, store.count, rebuild)
         try:
+            reader = _Reader(self._content["objects"], self._arrays, store, store.count, rebuild)
             coords, density, alias = (np.asarray(reader.decode(a)) for a in self._content["nodes"])
             offset = store.count
             store.add(coords.reshape(-1, 3), density)
@@ -292,7 +292,8 @@ class _Reader:
         if kind == "ChPoint" and attribute == "_parts":
             return {name: (nodes + self._offset, values) for name, (nodes, values) in value.items()}
         if attribute == "_version":
-            return -1
+            # Nodes were written after all merges.
+            return self._store.version
         if attribute not in NODES.get(kind, ()):
             return value
         if isinstance(value, int):

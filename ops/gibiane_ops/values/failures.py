@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gibiane.registry import Context
-
 from gibiane_ops.kernels import errors as k
 
 
@@ -96,3 +95,12 @@ def worded(ctx: Context, *, at: str | None = None) -> Iterator[None]:
         )
     except k.MeshingFailed as failure:
         ctx.fail(27, "the mesher failed: {reason}", at=at, reason=failure.reason)
+    except k.UnreadableFile as failure:
+        ctx.fail(
+            "G501",
+            "the file {path} cannot be read: {reason}",
+            at=at,
+            path=failure.path,
+            reason=failure.reason,
+            hint="is the format right, and the file whole?",
+        )

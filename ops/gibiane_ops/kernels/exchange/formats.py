@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from gibiane_ops.kernels.arrays import IntArray
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import SHAPES, shape
 from gibiane_ops.kernels.errors import BadValue, MissingPackage, UnreadableFile
 from gibiane_ops.kernels.exchange.meshfile import MeshFile, numbered_groups
@@ -91,8 +91,7 @@ def read_mesh(path: Path, word: str) -> MeshFile:
         text = path.read_bytes().decode("latin-1")
         return read_unv(path.as_posix(), text).checked(path.as_posix())
     _need_h5py(word)
-    import meshio
-
+    meshio = _meshio()
     reader = BY_EXTENSION.get(path.suffix.lower(), of.reader) if word == "VTK" else of.reader
     mesh = _guarded(path, of.name, lambda: meshio.read(path, file_format=reader))
     try:
@@ -104,6 +103,16 @@ def read_mesh(path: Path, word: str) -> MeshFile:
 def _need_h5py(word: str) -> None:
     if word == "MED" and find_spec("h5py") is None:
         raise MissingPackage("h5py", "pip install h5py")
+
+
+def _meshio() -> Any:
+    """Import meshio; version 5.3.5 forgets the dimension of two of its types of elements."""
+    import meshio
+    from meshio import _mesh
+
+    for name in ("wedge15", "pyramid13"):
+        _mesh.topological_dimension.setdefault(name, 3)
+    return meshio
 
 
 def _guarded(path: Path, name: str, call: Callable[[], Any]) -> Any:
@@ -223,11 +232,10 @@ def write_mesh_file(path: Path, word: str, mesh: MeshFile) -> None:
     _need_h5py(word)
     if word == "STL":
         mesh = _triangles(mesh)
-    import meshio
-
+    meshio = _meshio()
     cells, data, named, sets = _tagged(mesh, of)
     file = meshio.Mesh(
-        mesh.points,
+        _rounded(mesh.points) if word == "NAS" else mesh.points,
         cells,
         point_data=dict(mesh.point_data) if word in ("MED", "AVS", "GMSH") else {},
         cell_data=data,
@@ -237,12 +245,16 @@ def write_mesh_file(path: Path, word: str, mesh: MeshFile) -> None:
     )
     if word == "MED":
         file.cell_tags, file.point_tags = _families(mesh, file), {}
-    options = {"binary": False} if word == "GMSH" else {}
     try:
-        _guarded(path, of.name, lambda: file.write(path, file_format=of.writer, **options))
+        _guarded(path, of.name, lambda: file.write(path, file_format=of.writer))
     except UnreadableFile as failure:
         kinds = ", ".join(name for name, _ in mesh.blocks)
         raise BadValue("elements", kinds, f"elements that a {of.name} file can hold") from failure
+
+
+def _rounded(points: FloatArray) -> FloatArray:
+    """Keep the ten digits that the sixteen columns of a Nastran number hold, sign and exponent included."""
+    return np.array([float(f"{x:.9e}") for x in points.ravel()]).reshape(points.shape)
 
 
 def _tagged(mesh: MeshFile, of: Format) -> tuple[list[Any], dict[str, Any], dict[str, Any], dict[str, Any]]:

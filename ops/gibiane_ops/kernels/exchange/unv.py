@@ -57,9 +57,9 @@ def read_unv(path: str, text: str) -> MeshFile:
     try:
         for dataset, lines in _datasets(path, text):
             if dataset in NODES:
-                for head, row in zip(lines[0::2], lines[1::2], strict=True):
+                for head, record in zip(lines[0::2], lines[1::2], strict=True):
                     labels.append(int(head.split()[0]))
-                    points.append([float(x.replace("D", "E").replace("d", "e")) for x in row.split()[:3]])
+                    points.append([float(x.replace("D", "E").replace("d", "e")) for x in record.split()[:3]])
             elif dataset in ELEMENTS:
                 _elements(lines, cells, place, skipped)
             elif dataset in GROUPS:
