@@ -127,7 +127,6 @@ MECHANICS = {
     "contact cannot balance the load: {reason}": "le contact ne peut équilibrer le chargement : {reason}",
     "reduce the tangential load, raise MU, or hold the solid": "réduire le chargement tangentiel, augmenter MU, ou tenir le solide",
     "the system is singular: {reason}": "le système est singulier : {reason}",
-    "is every solid held, and every element sound?": "chaque solide est-il tenu, et chaque élément correct ?",
     "the model mixes solids and contact: make their matrices one by one": "le modèle mêle solides et contact : faire leurs matrices une à une",
     "{count} nodes of the smaller surface have no partner and stay free of contact": "{count} noeuds de la plus petite surface n'ont pas de vis-à-vis et restent sans contact",
     "the surfaces do not face each other: their normals point the same way at {count} of {total} pairs": "les surfaces ne se font pas face : leurs normales vont dans le même sens à {count} des {total} couples",
