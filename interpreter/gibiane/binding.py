@@ -8,7 +8,7 @@ declared form from it, or says how far it came.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gibiane import cast3m
 from gibiane.diagnostics import Diagnostic, GibianeError, Label, Text, make, nearest
@@ -16,9 +16,6 @@ from gibiane.forms import Arg, Form, Key
 from gibiane.nodes import Literal, Name, Node
 from gibiane.source import SourceText, Span
 from gibiane.values import ANNULE, ANY, ENTIER, FLOTTANT, MOT, PROCEDUR, Procedure, Table, type_of
-
-if TYPE_CHECKING:
-    from gibiane.registry import Operator
 
 
 class Mark:
@@ -140,8 +137,9 @@ class Operands:
     def not_available(self, i: int, name: str, near: str) -> Diagnostic:
         """Return the error 251 for an operator or procedure of Cast3M that is not here, called by word `i`."""
         hint = "the nearest thing here: {near}" if near else "gibiane check --portability lists what a script misses"
-        failure = make(251, "{name} of Cast3M is not available yet", name=name, near=near, hint=hint,
-                       span=self.span(self.nodes[i]))
+        failure = make(
+            251, "{name} of Cast3M is not available yet", name=name, near=near, hint=hint, span=self.span(self.nodes[i])
+        )
         failure.operator = ""  # nobody else speaks for it
         return failure
 
@@ -203,9 +201,17 @@ class Operands:
         close = nearest(word[:8], list(words))
         if close is None and (short := nearest(word[:4], [w[:4] for w in words])) is not None:
             close = next(w for w in words if w[:4] == short)
-        return GibianeError(make(7, "unknown keyword '{word}'; accepted: {accepted}", word=word, accepted=accepted,
-                                 span=self.span(self.nodes[i]), hint="did you mean '{close}'?" if close else None,
-                                 close=close))
+        return GibianeError(
+            make(
+                7,
+                "unknown keyword '{word}'; accepted: {accepted}",
+                word=word,
+                accepted=accepted,
+                span=self.span(self.nodes[i]),
+                hint="did you mean '{close}'?" if close else None,
+                close=close,
+            )
+        )
 
     def push_front(self, results: Sequence[Any], node: Node) -> None:
         """Put results at the front, in order, where the next operator finds them first."""
@@ -330,16 +336,21 @@ def _read_key(key: Key, word: str, q: Operands, bound: dict[str, Any]) -> Arg | 
     return None
 
 
-def explain(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeError:
-    """Word the failure of every form of an operator: an unknown keyword, a missing operand, or wrong types."""
+def explain(name: str, misses: list[Mismatch], q: Operands, *, symbolic: bool) -> GibianeError:
+    """Word the failure of every form of the operator `name`: an unknown keyword, a missing operand, or wrong types."""
     best = max(misses, key=lambda m: m.matched)
-    forms = [m.form.usage(operator.name) for m in misses][:6]
+    forms = [m.form.usage(name) for m in misses][:6]
     i = q.first_word()
-    if operator.symbolic:
-        failure = _explain_infix(operator, misses, q)
+    if symbolic:
+        failure = _explain_infix(name, q)
         forms = []  # what every type of operands gives is of no help for two of them
-    elif i >= 0 and best.keys and isinstance(q.values[i], str) and not q.is_operator_word(i) and not _is_misspelt_name(
-            q, i, best, keys := sorted({w for m in misses for w in m.keys})):
+    elif (
+        i >= 0
+        and best.keys
+        and isinstance(q.values[i], str)
+        and not q.is_operator_word(i)
+        and not _is_misspelt_name(q, i, best, keys := sorted({w for m in misses for w in m.keys}))
+    ):
         failure = q.unknown_keyword(keys)
     elif isinstance(best.wanted, Key):
         words = " or ".join(f"'{w}'" for w in best.wanted.words)
@@ -349,7 +360,7 @@ def explain(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeE
     else:
         failure = q.missing(ANY)
     failure.diagnostic.forms = forms
-    failure.diagnostic.more = f"INFO {operator.name} ;"
+    failure.diagnostic.more = f"INFO {name} ;"
     return failure
 
 
@@ -361,7 +372,7 @@ def _is_misspelt_name(q: Operands, i: int, best: Mismatch, keys: Sequence[str]) 
     return nearest(node.word[:8], keys) is None or nearest(node.word, list(q.session.names())) is not None
 
 
-def _explain_infix(operator: Operator, misses: list[Mismatch], q: Operands) -> GibianeError:
+def _explain_infix(name: str, q: Operands) -> GibianeError:
     readable = []
     for i, value in enumerate(q.values):
         if type_of(value) in (MOT, PROCEDUR):
@@ -370,12 +381,23 @@ def _explain_infix(operator: Operator, misses: list[Mismatch], q: Operands) -> G
     if len(readable) >= 2:
         labels = [q.describe(i) for i in readable[:2]]
         types = [type_of(q.values[i]) for i in readable[:2]]
-        return GibianeError(make(196, "cannot work on {left} and {right}", left=types[0], right=types[1],
-                                 labels=labels, span=labels[0].span))
+        return GibianeError(
+            make(
+                196,
+                "cannot work on {left} and {right}",
+                left=types[0],
+                right=types[1],
+                labels=labels,
+                span=labels[0].span,
+            )
+        )
     if readable:
         labels = [q.describe(0)]
-        hint = "two operands are wanted" if operator.name not in "+-" else (
-            "two operands are wanted; a sign belongs to a number only: write -1 * X")
+        hint = (
+            "two operands are wanted"
+            if name not in "+-"
+            else ("two operands are wanted; a sign belongs to a number only: write -1 * X")
+        )
         if len(q.values) > 1 and not isinstance(q.nodes[1], Name):
             labels.append(q.describe(1))
         failure = make(37, "its second operand is missing", labels=labels, span=labels[0].span, hint=hint)
@@ -383,4 +405,3 @@ def _explain_infix(operator: Operator, misses: list[Mismatch], q: Operands) -> G
         return GibianeError(failure)
     labels = [q.describe(0)] if q.values else []
     return GibianeError(make(533, "its operands are missing", labels=labels, span=labels[0].span if labels else None))
-

@@ -129,15 +129,25 @@ def check_structure(program: list[Instr], start: int, end: int) -> list[Diagnost
         elif head == "FIN" and (name := block_name(program[index])):
             if open_blocks and open_blocks[-1][0] == "SI" and any(b[0] == "REPE" for b in open_blocks):
                 line = program[open_blocks[-1][1]].span().line
-                report(1022, "the SI of line {line} is still open at the end of this loop", index,
-                       "write its FINSI before this FIN", line=line)
+                report(
+                    1022,
+                    "the SI of line {line} is still open at the end of this loop",
+                    index,
+                    "write its FINSI before this FIN",
+                    line=line,
+                )
                 while open_blocks and open_blocks[-1][0] == "SI":
                     open_blocks.pop()
             if open_blocks and open_blocks[-1][0] == "REPE" and name in names[open_blocks[-1][1]]:
                 open_blocks.pop()
             else:
-                report(154, "{name} is not the innermost open loop", index, "close the loops from the inside out",
-                       name=name)
+                report(
+                    154,
+                    "{name} is not the innermost open loop",
+                    index,
+                    "close the loops from the inside out",
+                    name=name,
+                )
     for word, index, _ in open_blocks:
         closing = "FINSI" if word == "SI" else "FIN"
         report(1023, "this {word} is never closed", index, "write its {closing}", word=word, closing=closing)

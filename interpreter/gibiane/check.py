@@ -10,16 +10,18 @@ from gibiane.blocks import annotate, block_name, check_structure
 from gibiane.diagnostics import Diagnostic, make
 from gibiane.nodes import Access, Group, Instr, Literal, Name, Node
 from gibiane.source import SourceText
-from gibiane.syntax import parse
+from gibiane.syntax import parse, refuse_long
 
 
-def problems(source: SourceText) -> list[Diagnostic]:
+def problems(source: SourceText, *, strict: bool = False) -> list[Diagnostic]:
     """Return the syntax errors and wrong block structures of a source text, in order of place.
 
     What follows the `FIN ;` of a script is not read. Block structure is judged only when every instruction is
-    sound, for a lost `;` takes block words with it.
+    sound, for a lost `;` takes block words with it. `strict` refuses instructions that Cast3M finds too long.
     """
     program = parse(source)
+    if strict:
+        refuse_long(program)
     lost = slips.apostrophe(source)[0] if slips.ends_in_string(program) else None
     read = _until_end(program)
     if lost is None or read[-1].end <= lost:

@@ -20,7 +20,8 @@ usage: gibiane FILE [NAME=VALUE ...]    run a script (- reads it from standard i
        gibiane info NAME                describe an operator
        gibiane test DIR [--bless]       run golden scripts: x.dgibi against x.out
        gibiane docs [--check] [FILE]    write OPERATORS.md, or say whether it is stale
-options: --echo N  --lang fr|en  --strict  --allow-exec  --debug  --version  --help
+options: --echo N  --lang fr|en  --allow-exec  --debug  --version  --help
+         --strict  refuse what Cast3M refuses for its length: instructions of more than 500 characters
 """
 
 
@@ -110,8 +111,16 @@ def _options(arguments: list[str]) -> tuple[dict[str, Any], list[str]]:
             options[word[2:]] = value
             i += 2
             continue
-        if word in ("--strict", "--allow-exec", "--debug", "--version", "--help", "--check", "--bless",
-                    "--portability"):
+        if word in (
+            "--strict",
+            "--allow-exec",
+            "--debug",
+            "--version",
+            "--help",
+            "--check",
+            "--bless",
+            "--portability",
+        ):
             options[word[2:]] = True
         elif word == "-h":
             options["help"] = True
@@ -147,7 +156,9 @@ def _finish(session: Any, code: int) -> int:
     """Say the error level of the run, on stderr, when there is one (or ECHO asks for it)."""
     if session.worst >= 1 or session.options["ECHO"] >= 1:
         session.out.flush()
-        session.err.write(f" **********     Arret du programme Gibiane. Niveau d'erreur: {session.worst}     **********\n")
+        session.err.write(
+            f" **********     Arret du programme Gibiane. Niveau d'erreur: {session.worst}     **********\n"
+        )
     return code
 
 
@@ -175,7 +186,7 @@ def _check(options: dict[str, Any], files: list[str]) -> int:
         source = session.open(name)
         if source is None:
             continue
-        for diagnostic in problems(source):
+        for diagnostic in problems(source, strict=bool(options.get("strict"))):
             session.emit(diagnostic)
         if options.get("portability"):
             missing += _portability(session, source)

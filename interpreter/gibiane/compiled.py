@@ -24,7 +24,7 @@ _NUMBERS = (int, float)
 
 
 class Fallback(Exception):
-    """This evaluation is not for the closures."""
+    """An evaluation that is not for the closures."""
 
 
 FALLBACK = Fallback()
@@ -40,7 +40,7 @@ def _quotient(a: Any, b: Any) -> Any:
 
 
 def _power(a: Any, b: Any) -> Any:
-    if a <= 0 or type(b) is int and type(a) is int:
+    if a <= 0 or (type(b) is int and type(a) is int):
         raise FALLBACK
     return a**b
 
@@ -192,7 +192,9 @@ def _comparison(items: Sequence[Node]) -> Fetch | None:
     return lambda frame: compare(a(frame), b(frame))
 
 
-def _equality(left: Sequence[Node], right: Sequence[Node], symbol: str, a: Fetch | None, b: Fetch | None) -> Fetch | None:
+def _equality(
+    left: Sequence[Node], right: Sequence[Node], symbol: str, a: Fetch | None, b: Fetch | None
+) -> Fetch | None:
     if symbol != "EGA" or a is None or b is None:
         return None
 
@@ -217,8 +219,11 @@ def _split(items: Sequence[Node]) -> tuple[list[list[Node]], list[str]] | None:
             wants_operand = True
             continue
         if wants_operand:
-            if isinstance(item, Literal) and isinstance(item.value, str) and not (
-                    operands and operands[-1] and isinstance(operands[-1][-1], Access)):
+            if (
+                isinstance(item, Literal)
+                and isinstance(item.value, str)
+                and not (operands and operands[-1] and isinstance(operands[-1][-1], Access))
+            ):
                 return None
             if operands and isinstance(operands[-1][-1], Access):
                 operands[-1].append(item)
@@ -226,7 +231,9 @@ def _split(items: Sequence[Node]) -> tuple[list[list[Node]], list[str]] | None:
                 operands.append([item])
             wants_operand = False
             continue
-        word = item.value if isinstance(item, Literal) and not item.quoted else item.word if isinstance(item, Name) else ""
+        word = (
+            item.value if isinstance(item, Literal) and not item.quoted else item.word if isinstance(item, Name) else ""
+        )
         if not isinstance(word, str) or (word not in NUMERIC and word not in COMPARE and word != "EGA"):
             return None
         symbols.append(word)
@@ -313,12 +320,16 @@ def _binary(symbol: str, left: Fetch, right: Fetch, right_nodes: Sequence[Node])
     """Return the closure of one operation; the common ones are written out, which saves a call."""
     constant = right_nodes[0].value if len(right_nodes) == 1 and isinstance(right_nodes[0], Literal) else None
     if symbol == "+":
-        return (lambda frame: left(frame) + right(frame)) if constant is None else (lambda frame: left(frame) + constant)
+        return (
+            (lambda frame: left(frame) + right(frame)) if constant is None else (lambda frame: left(frame) + constant)
+        )
     if symbol == "-":
-        return (lambda frame: left(frame) - right(frame)) if constant is None else (lambda frame: left(frame) - constant)
+        return (
+            (lambda frame: left(frame) - right(frame)) if constant is None else (lambda frame: left(frame) - constant)
+        )
     if symbol == "*":
-        return (lambda frame: left(frame) * right(frame)) if constant is None else (lambda frame: left(frame) * constant)
+        return (
+            (lambda frame: left(frame) * right(frame)) if constant is None else (lambda frame: left(frame) * constant)
+        )
     operate = NUMERIC[symbol]
     return lambda frame: operate(left(frame), right(frame))
-
-

@@ -213,7 +213,9 @@ def _excerpt(labels: Sequence[Label], margin: str, lang: str, paint: Any) -> lis
         room = min(len(raw) - span.column + 1, WIDEST - column + 1)
         width = max(1, min(span.end - span.start, room))
         caption = label.text.render(lang)
-        lines.append(f"{margin} {bar} {' ' * (column - 1)}{paint('^' * width, 'red')}{' ' + caption if caption else ''}")
+        lines.append(
+            f"{margin} {bar} {' ' * (column - 1)}{paint('^' * width, 'red')}{' ' + caption if caption else ''}"
+        )
     return lines
 
 

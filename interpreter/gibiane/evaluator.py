@@ -6,19 +6,16 @@ results in front; this repeats until the first word is no operator or none is le
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gibiane import compiled, control, faults, objects, procedures, slips
 from gibiane.binding import ABSENT, DOT, PERCENT, Mark, Operands
-from gibiane.diagnostics import FATAL, GibianeError, Label, Text, make, nearest
+from gibiane.diagnostics import FATAL, GibianeError, Text, make
 from gibiane.frames import Frame
 from gibiane.nodes import Access, Group, Instr, Literal, Name, Node, Target
 from gibiane.registry import Operator, find
 from gibiane.source import SourceText, Span
-from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Procedure, Table, Texte, type_of
-
-if TYPE_CHECKING:
-    from gibiane.session import Session
+from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Procedure, Table, Texte
 
 KEEPS_TEXT = frozenset({"TYPE", "TEXTE", "LISTER", "EXISTE", "EGA", "NEG"})
 
@@ -26,10 +23,11 @@ KEEPS_TEXT = frozenset({"TYPE", "TEXTE", "LISTER", "EXISTE", "EGA", "NEG"})
 class Evaluator:
     """Runs programs in the frames of one session."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: Any) -> None:
         self.session = session
         self.frame: Frame = Frame(self, None, None)
         self.current: Instr | None = None
+        self.failed: Frame | None = None  # the innermost frame of the error that stopped the run
         self.closures = True  # False: the queue machine alone, which defines the language (tests compare both)
         self._echoed: tuple[SourceText | None, int] = (None, 0)
 
@@ -92,11 +90,16 @@ class Evaluator:
             if mode == "IGNO":
                 self.session.emit(diag)
             return
+        if self.failed is None:
+            self.failed = self.frame
+            if self.session.options["DEBU"] and self.frame.procedure is not None:
+                diag.notes.append(faults.local_objects(self))
         raise failure
 
-    def unwind(self) -> None:
-        """Return to the session's own frame after a stop, closing what was open."""
-        self.frame = self.session.globals
+    def unwind(self, *, stay: bool = False) -> None:
+        """Return to the session's own frame after a stop, closing what was open; `stay` in the one that failed."""
+        self.frame = (self.failed or self.frame) if stay else self.session.globals
+        self.failed = None
         self.frame.loops.clear()
 
     def _read_lines(self, instr: Instr) -> None:
@@ -146,8 +149,16 @@ class Evaluator:
             return value
         if target.type_name is not None:
             label = [q.describe(0, target.type_name)] if q.values else []
-            raise GibianeError(make(37, "no {type} among the results for {name}", type=target.type_name,
-                                    name=target.name, span=instr.at(target), labels=label))
+            raise GibianeError(
+                make(
+                    37,
+                    "no {type} among the results for {name}",
+                    type=target.type_name,
+                    name=target.name,
+                    span=instr.at(target),
+                    labels=label,
+                )
+            )
         if q.values and isinstance(q.values[0], Mark):
             raise faults.stray_access(self, q, 0)
         raise faults.no_result(self, target, instr)
@@ -160,8 +171,9 @@ class Evaluator:
         if not target.path:
             self.assign_name(target.name, value, instr)
             return
-        container = (objects.attribute(self, target.name, instr.at(target)) if target.member
-                     else self.frame.lookup(target.name))
+        container = (
+            objects.attribute(self, target.name, instr.at(target)) if target.member else self.frame.lookup(target.name)
+        )
         for step, (_, index) in enumerate(target.path):
             if not isinstance(container, Table):
                 raise faults.no_table(self, target, step, container, instr)
@@ -291,8 +303,14 @@ class Evaluator:
         if dim == 3:
             third, _ = q.take((ENTIER, FLOTTANT))
             if third is ABSENT:
-                raise GibianeError(make(37, "a point in space has three coordinates; only two numbers are here",
-                                        span=q.span(node), hint="write the third, or OPTI DIME 2"))
+                raise GibianeError(
+                    make(
+                        37,
+                        "a point in space has three coordinates; only two numbers are here",
+                        span=q.span(node),
+                        hint="write the third, or OPTI DIME 2",
+                    )
+                )
             coordinates.append(third)
         q.push_front([self.session.point_maker(coordinates)], node)
 

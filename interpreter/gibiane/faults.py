@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gibiane import cast3m, procedures
 from gibiane.binding import ABSENT, DOT, Mark, Operands
 from gibiane.diagnostics import GibianeError, Label, Text, make, nearest
 from gibiane.nodes import Instr, Literal, Name, Node, Target
 from gibiane.registry import Operator, find, spellings
+from gibiane.runner import Runner
 from gibiane.source import Span
 from gibiane.values import ENTIER, FLOTTANT, Procedure, type_of
 
-if TYPE_CHECKING:
-    from gibiane.evaluator import Evaluator
 
-
-def leftover(ev: Evaluator, q: Operands, at: int, full: Operands | None = None) -> GibianeError:
+def leftover(ev: Runner, q: Operands, at: int, full: Operands | None = None) -> GibianeError:
     """Return the error for value `at` of a queue, which nothing has read; `full` is the queue before assignment."""
     whole = full or q
     for i, value in enumerate(whole.values):
@@ -47,7 +45,7 @@ def leftover(ev: Evaluator, q: Operands, at: int, full: Operands | None = None) 
     return GibianeError(failure)
 
 
-def _stopped_by(ev: Evaluator, q: Operands, at: int, unread: Node) -> GibianeError | None:
+def _stopped_by(ev: Runner, q: Operands, at: int, unread: Node) -> GibianeError | None:
     """Explain the first word of a queue that stopped its evaluation: misspelt, not available, or in a wrong place."""
     word, node = q.values[at], q.nodes[at]
     span = q.span(node)
@@ -102,7 +100,7 @@ def _is_symbol(q: Operands, i: int) -> bool:
     return isinstance(node, Literal) and not node.quoted and isinstance(node.value, str)
 
 
-def unknown(ev: Evaluator, q: Operands, at: int, unread: Node | None = None) -> GibianeError:
+def unknown(ev: Runner, q: Operands, at: int, unread: Node | None = None) -> GibianeError:
     """Return the error for a word that is no operator, procedure or object, where one was meant."""
     word, node = q.values[at], q.nodes[at]
     span = q.span(node)
@@ -127,7 +125,7 @@ def unknown(ev: Evaluator, q: Operands, at: int, unread: Node | None = None) -> 
     )
 
 
-def stray_access(ev: Evaluator, q: Operands, i: int) -> GibianeError:
+def stray_access(ev: Runner, q: Operands, i: int) -> GibianeError:
     """Return the error for a separator whose left side has no elements."""
     if not i:
         return GibianeError(make(11, "nothing stands before this separator", span=q.span(q.nodes[i])))
@@ -142,7 +140,7 @@ def stray_access(ev: Evaluator, q: Operands, i: int) -> GibianeError:
     )
 
 
-def _called(ev: Evaluator) -> Procedure | None:
+def _called(ev: Runner) -> Procedure | None:
     """Return the procedure that the current instruction names."""
     for item in ev.current.items if ev.current is not None else []:
         if isinstance(item, Name) and isinstance(value := ev.frame.lookup(item.name), Procedure):
@@ -150,7 +148,7 @@ def _called(ev: Evaluator) -> Procedure | None:
     return None
 
 
-def _first_operator(ev: Evaluator) -> Operator | None:
+def _first_operator(ev: Runner) -> Operator | None:
     """Return the operator that the current instruction begins with."""
     items = ev.current.items if ev.current is not None else []
     first = items[0] if items else None
@@ -158,7 +156,7 @@ def _first_operator(ev: Evaluator) -> Operator | None:
     return find(word) if isinstance(word, str) else None
 
 
-def no_result(ev: Evaluator, target: Target, instr: Instr) -> GibianeError:
+def no_result(ev: Runner, target: Target, instr: Instr) -> GibianeError:
     """Return the error for a name for which no result is left."""
     hint = "the right side gives fewer results than there are names"
     fields: dict[str, Any] = {"name": target.name}
@@ -169,7 +167,7 @@ def no_result(ev: Evaluator, target: Target, instr: Instr) -> GibianeError:
     return GibianeError(make(37, "no result is left for {name}", span=instr.at(target), hint=hint, **fields))
 
 
-def no_table(ev: Evaluator, target: Target, step: int, container: object, instr: Instr) -> GibianeError:
+def no_table(ev: Runner, target: Target, step: int, container: object, instr: Instr) -> GibianeError:
     """Return the error for an element of something that is no table, on the left of `=`."""
     end = target.path[step - 1][1].end if step else target.start + len(target.name)
     span = Span(instr.source, target.start, min(end, target.end))
@@ -201,7 +199,7 @@ def no_table(ev: Evaluator, target: Target, step: int, container: object, instr:
 # -- warnings of a session at the prompt --------------------------------------------------------------------------
 
 
-def lonely_word(ev: Evaluator, q: Operands) -> None:
+def lonely_word(ev: Runner, q: Operands) -> None:
     """Judge a directive whose only value is a word, which the language drops: refuse operators of Cast3M.
 
     At the prompt, warn of a word that nothing has.
@@ -227,7 +225,7 @@ def lonely_word(ev: Evaluator, q: Operands) -> None:
     )
 
 
-def warn_hidden_operators(ev: Evaluator, program: list[Instr]) -> None:
+def warn_hidden_operators(ev: Runner, program: list[Instr]) -> None:
     """Warn of names that a text gives a value and that hide an operator from then on."""
     known = set(ev.session.names())
     for instr in program:
@@ -248,7 +246,7 @@ def warn_hidden_operators(ev: Evaluator, program: list[Instr]) -> None:
                 )
 
 
-def warn_traps(ev: Evaluator, op: Operator, q: Operands, at: int) -> None:
+def warn_traps(ev: Runner, op: Operator, q: Operands, at: int) -> None:
     """Warn of two traps before an operator runs: a word taken for it by four letters, operands far from a symbol."""
     node = q.nodes[at]
     if op.symbolic:
@@ -278,3 +276,14 @@ def warn_traps(ev: Evaluator, op: Operator, q: Operands, at: int) -> None:
                     hint="an object of this name must be given a value first",
                 )
             )
+
+
+def local_objects(ev: Runner) -> Text:
+    """Return the note that shows what the procedure of the current frame holds (OPTI DEBU 1)."""
+    frame = ev.frame
+    shown = [
+        f"{name} {type_of(value)}" + (f" {ev.session.brief(value)}" if isinstance(value, int | float | str) else "")
+        for name, value in sorted(frame.names.items())
+    ]
+    name = frame.procedure.name if frame.procedure is not None else ""
+    return Text("objects of {name}: {objects}", {"name": name, "objects": ", ".join(shown) or "-"})

@@ -15,8 +15,16 @@ class Arg:
     unless `optional`); an absent optional operand is None.
     """
 
-    def __init__(self, name: str, types: str | Sequence[str], doc: str = "", *, optional: bool = False,
-                 many: bool = False, subtype: str | None = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        types: str | Sequence[str],
+        doc: str = "",
+        *,
+        optional: bool = False,
+        many: bool = False,
+        subtype: str | None = None,
+    ) -> None:
         self.name = name
         self.types = (types,) if isinstance(types, str) else tuple(types)
         self.doc = doc
@@ -38,8 +46,16 @@ class Key:
     these with `repeat`.
     """
 
-    def __init__(self, words: str | Sequence[str], doc: str = "", *args: Arg, name: str | None = None,
-                 required: bool = False, repeat: bool = False, width: int = 4) -> None:
+    def __init__(
+        self,
+        words: str | Sequence[str],
+        doc: str = "",
+        *args: Arg,
+        name: str | None = None,
+        required: bool = False,
+        repeat: bool = False,
+        width: int = 4,
+    ) -> None:
         self.words = (words,) if isinstance(words, str) else tuple(words)
         self.doc = doc
         self.args = args
@@ -68,8 +84,16 @@ class Key:
 class Form:
     """One way of calling an operator: what it reads, what it gives, and the function that does it."""
 
-    def __init__(self, parts: Sequence[Arg | Key], gives: Sequence[str], function: Function, *, stream: bool,
-                 syntax: str | None, last: bool) -> None:
+    def __init__(
+        self,
+        parts: Sequence[Arg | Key],
+        gives: Sequence[str],
+        function: Function,
+        *,
+        stream: bool,
+        syntax: str | None,
+        last: bool,
+    ) -> None:
         self.args = [p for p in parts if isinstance(p, Arg)]
         self.keys = [p for p in parts if isinstance(p, Key)]
         self.gives = list(gives)
@@ -84,6 +108,10 @@ class Form:
     def usage(self, name: str) -> str:
         """Return the usage line of this form."""
         left = " ".join(self.gives)
-        body = self.syntax if self.syntax is not None else " ".join([*(a.usage() for a in self.args), *(k.usage() for k in self.keys)])
+        body = (
+            self.syntax
+            if self.syntax is not None
+            else " ".join([*(a.usage() for a in self.args), *(k.usage() for k in self.keys)])
+        )
         text = f"{name} {body}".rstrip()
         return f"{left} = {text} ;" if left else f"{text} ;"

@@ -44,7 +44,9 @@ def _fit(text: str, width: int) -> str:
 
 _DESCRIPTOR = re.compile(
     r"(?P<sp>SP,?)?(?:(?P<scale>[+-]?\d+)P,?)?(?P<sp2>SP,?)?(?P<count>\d+)?(?P<kind>ES|EN|[FEDGIA])"
-    r"(?P<width>\d+)?(?:\.(?P<digits>\d+))?(?:E(?P<exp>\d+))?$", re.IGNORECASE)
+    r"(?P<width>\d+)?(?:\.(?P<digits>\d+))?(?:E(?P<exp>\d+))?$",
+    re.IGNORECASE,
+)
 
 
 class BadFormat(Exception):

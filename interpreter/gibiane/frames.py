@@ -44,8 +44,19 @@ class Loop:
 class Frame:
     """The names of one call (or of the session), on top of the caller's."""
 
-    __slots__ = ("arguments", "depth", "evaluator", "loops", "names", "origins", "parent", "procedure", "quitting",
-                 "results", "this")
+    __slots__ = (
+        "arguments",
+        "depth",
+        "evaluator",
+        "loops",
+        "names",
+        "origins",
+        "parent",
+        "procedure",
+        "quitting",
+        "results",
+        "this",
+    )
 
     def __init__(self, evaluator: Any, parent: Frame | None, procedure: Procedure | None) -> None:
         self.evaluator = evaluator

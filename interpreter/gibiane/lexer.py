@@ -102,8 +102,12 @@ def tokens(source: SourceText, errors: dict[int, Diagnostic], start: int = 0) ->
             found = _STRING.match(text, at)
             if found is None:
                 end = size
-                errors[at] = make("G102", "the string that starts here is never closed", span=Span(source, at, at + 1),
-                                  hint="close it with an apostrophe; inside a string an apostrophe is written twice")
+                errors[at] = make(
+                    "G102",
+                    "the string that starts here is never closed",
+                    span=Span(source, at, at + 1),
+                    hint="close it with an apostrophe; inside a string an apostrophe is written twice",
+                )
                 yield Token("STRING", text[at + 1 :], at, end)
             else:
                 end = found.end()
@@ -136,16 +140,27 @@ def tokens(source: SourceText, errors: dict[int, Diagnostic], start: int = 0) ->
             yield Token("ACCESS", "%", at, end)
         else:
             end = at + 1
-            errors[at] = make("G101", "the character {char} cannot stand here", char=repr(char),
-                              span=Span(source, at, end), hint=_hint_for(char))
+            errors[at] = make(
+                "G101",
+                "the character {char} cannot stand here",
+                char=repr(char),
+                span=Span(source, at, end),
+                hint=_hint_for(char),
+            )
         after_dot = False
         at = end
 
 
 def _number(source: SourceText, errors: dict[int, Diagnostic], start: int, end: int) -> Token:
     if end - start > MOST_DIGITS:
-        errors[start] = make("G101", "a number of {length} characters", length=end - start,
-                             span=Span(source, start, start + 1), hint="at most {most} are read", most=MOST_DIGITS)
+        errors[start] = make(
+            "G101",
+            "a number of {length} characters",
+            length=end - start,
+            span=Span(source, start, start + 1),
+            hint="at most {most} are read",
+            most=MOST_DIGITS,
+        )
         return Token("NUMBER", 0, start, end)
     return Token("NUMBER", number_value(source.text[start:end]), start, end)
 

@@ -89,14 +89,23 @@ def read_script(path: Path) -> SourceText:
         raise error(1130, "{path} is a folder, not a script", path=path.as_posix()) from None
     except OSError as failure:
         close = _similar_file(path)
-        raise error(1130, "the script {path} cannot be opened ({reason})", path=path.as_posix(),
-                    reason=(failure.strerror or "cannot be read").lower(), close=close,
-                    hint="did you mean {close}?" if close else None) from None
+        raise error(
+            1130,
+            "the script {path} cannot be opened ({reason})",
+            path=path.as_posix(),
+            reason=(failure.strerror or "cannot be read").lower(),
+            close=close,
+            hint="did you mean {close}?" if close else None,
+        ) from None
     try:
         return SourceText(path.as_posix(), decode(data), str(path.parent))
     except NotText as failure:
-        raise error("G101", "{path} is not a text file (a NUL byte at offset {offset})", path=path.as_posix(),
-                    offset=failure.offset) from None
+        raise error(
+            "G101",
+            "{path} is not a text file (a NUL byte at offset {offset})",
+            path=path.as_posix(),
+            offset=failure.offset,
+        ) from None
 
 
 def _similar_file(path: Path) -> str | None:

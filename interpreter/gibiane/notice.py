@@ -44,11 +44,23 @@ def notice(ctx: Context, word: str, node: Any) -> str:
     missing = cast3m.meant(word)
     if missing is not None:
         name, near = missing
-        ctx.fail(251, "{name} of Cast3M is not available yet", at="word", name=name, near=near,
-                 hint="the nearest thing here: {near}" if near else None)
+        ctx.fail(
+            251,
+            "{name} of Cast3M is not available yet",
+            at="word",
+            name=name,
+            near=near,
+            hint="the nearest thing here: {near}" if near else None,
+        )
     close = nearest(word, registry.spellings())
-    ctx.fail(9, "there is no operator {word}", at="word", word=word, close=close,
-             hint="did you mean {close}?" if close else "gibiane docs lists the operators")
+    ctx.fail(
+        9,
+        "there is no operator {word}",
+        at="word",
+        word=word,
+        close=close,
+        hint="did you mean {close}?" if close else "gibiane docs lists the operators",
+    )
 
 
 def operators() -> list[Operator]:
@@ -75,8 +87,17 @@ def markdown() -> str:
     return "\n".join(lines) + "\n"
 
 
-_SYMBOLS = {"+": "plus", "-": "minus", "*": "times", "/": "over", "**": "power", "<": "less", ">": "more",
-            "<EG": "less-or-equal", ">EG": "more-or-equal"}
+_SYMBOLS = {
+    "+": "plus",
+    "-": "minus",
+    "*": "times",
+    "/": "over",
+    "**": "power",
+    "<": "less",
+    ">": "more",
+    "<EG": "less-or-equal",
+    ">EG": "more-or-equal",
+}
 
 
 def _anchor(name: str) -> str:
@@ -84,8 +105,14 @@ def _anchor(name: str) -> str:
 
 
 def _section(op: Operator) -> list[str]:
-    lines = ["", f'### <a id="{_anchor(op.name)}"></a>`{op.name}`', "", f"{op.summary[0].upper()}{op.summary[1:]}.", "",
-             "```"]
+    lines = [
+        "",
+        f'### <a id="{_anchor(op.name)}"></a>`{op.name}`',
+        "",
+        f"{op.summary[0].upper()}{op.summary[1:]}.",
+        "",
+        "```",
+    ]
     lines.extend(form.usage(op.name) for form in op.forms)
     lines.extend(["```", ""])
     keys = {k.words: k for f in op.forms for k in f.keys if k.doc}

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gibiane.binding import ABSENT, Operands
 from gibiane.diagnostics import GibianeError, make, nearest
 from gibiane.nodes import Name, Node, Target
+from gibiane.runner import Runner
 from gibiane.source import Span
 from gibiane.values import Objet, Procedure, Table
-
-if TYPE_CHECKING:
-    from gibiane.evaluator import Evaluator
 
 BIND, INHERIT = "METHODE", "HERITE"
 
 
-def resolve(ev: Evaluator, q: Operands, i: int) -> int:
+def resolve(ev: Runner, q: Operands, i: int) -> int:
     """Resolve the `%` at position `i` of a queue; return the position from where to go on.
 
     After an object: its method, ready to be called. Otherwise: the attribute of the object whose method runs, or
@@ -39,29 +37,43 @@ def resolve(ev: Evaluator, q: Operands, i: int) -> int:
         known = [k for k, _ in this.attributes.entries.values() if isinstance(k, str)]
         name = _index(q, i + 1)
         close = nearest(name, known, 3) if isinstance(name, str) else None
-        raise GibianeError(make(535, "this object has no attribute {name}", name=name, span=span, close=close,
-                                hint="did you mean {close}?" if close else "%{name} = ... gives it one")) from None
+        raise GibianeError(
+            make(
+                535,
+                "this object has no attribute {name}",
+                name=name,
+                span=span,
+                close=close,
+                hint="did you mean {close}?" if close else "%{name} = ... gives it one",
+            )
+        ) from None
     q.values[i : i + 2] = [value]
     del q.nodes[i]
     return i + 1 if not isinstance(value, Table) else i
 
 
-def assign(ev: Evaluator, target: Target, value: Any, span: Span) -> None:
+def assign(ev: Runner, target: Target, value: Any, span: Span) -> None:
     """Give an attribute of the current object a value."""
     _this(ev, span).attributes.set(target.name, value)
 
 
-def attribute(ev: Evaluator, name: str, span: Span) -> Any:
+def attribute(ev: Runner, name: str, span: Span) -> Any:
     """Return an attribute of the current object, or ABSENT."""
     attributes = _this(ev, span).attributes
     return attributes.get(name) if attributes.has(name) else ABSENT
 
 
-def _this(ev: Evaluator, span: Span) -> Objet:
+def _this(ev: Runner, span: Span) -> Objet:
     this = ev.frame.this
     if not isinstance(this, Objet):
-        raise GibianeError(make(153, "attributes are seen inside a method only", span=span,
-                                hint="write a method that gives its value: DEBM ... FINM %X ;"))
+        raise GibianeError(
+            make(
+                153,
+                "attributes are seen inside a method only",
+                span=span,
+                hint="write a method that gives its value: DEBM ... FINM %X ;",
+            )
+        )
     return this
 
 
@@ -71,7 +83,7 @@ def _index(q: Operands, i: int) -> Any:
     return node.name if isinstance(node, Name) else q.values[i]
 
 
-def _method(ev: Evaluator, q: Operands, i: int, this: Objet) -> int:
+def _method(ev: Runner, q: Operands, i: int, this: Objet) -> int:
     node = q.nodes[i + 1]
     name = node.name if isinstance(node, Name) else str(q.values[i + 1]).upper()
     if name[:4] == BIND[:4]:
@@ -83,9 +95,17 @@ def _method(ev: Evaluator, q: Operands, i: int, this: Objet) -> int:
     found = this.methods.get(name, q.values[i + 1])
     if not (isinstance(found, Procedure) and found.is_method):
         close = nearest(name, list(this.methods))
-        raise GibianeError(make(9, "this object of class {kind} has no method {name}", kind=this.class_name, name=name,
-                                span=q.span(node), close=close, hint="did you mean {close}?" if close else (
-                                    "O%METHODE {name} M gives it one: M is defined with DEBM")))
+        raise GibianeError(
+            make(
+                9,
+                "this object of class {kind} has no method {name}",
+                kind=this.class_name,
+                name=name,
+                span=q.span(node),
+                close=close,
+                hint="did you mean {close}?" if close else ("O%METHODE {name} M gives it one: M is defined with DEBM"),
+            )
+        )
     q.values[i - 1 : i + 2] = [found.of(this)]
     del q.nodes[i - 1 : i + 1]
     return i
@@ -96,8 +116,14 @@ def _bind(q: Operands, i: int, this: Objet) -> None:
     node: Node | None = q.nodes[i + 2] if i + 2 < len(q.nodes) else None
     method = q.values[i + 3] if i + 3 < len(q.values) else None
     if not isinstance(node, Name) or not (isinstance(method, Procedure) and method.is_method):
-        raise GibianeError(make(37, "METHODE wants a name and a method", span=q.span(q.nodes[i + 1]),
-                                hint="O%METHODE NAME M ; where M is defined with DEBM"))
+        raise GibianeError(
+            make(
+                37,
+                "METHODE wants a name and a method",
+                span=q.span(q.nodes[i + 1]),
+                hint="O%METHODE NAME M ; where M is defined with DEBM",
+            )
+        )
     this.methods[node.name] = method
     del q.values[i - 1 : i + 4], q.nodes[i - 1 : i + 4]
 
@@ -106,8 +132,14 @@ def _inherit(q: Operands, i: int, this: Objet) -> None:
     """Do `O % HERITE OTHER`: the object gets the methods of another."""
     other = q.values[i + 2] if i + 2 < len(q.values) else None
     if not isinstance(other, Objet):
-        raise GibianeError(make(37, "HERITE wants the object whose methods are taken over",
-                                span=q.span(q.nodes[i + 1]), hint="O%HERITE OTHER ;"))
+        raise GibianeError(
+            make(
+                37,
+                "HERITE wants the object whose methods are taken over",
+                span=q.span(q.nodes[i + 1]),
+                hint="O%HERITE OTHER ;",
+            )
+        )
     for name, method in other.methods.items():
         this.methods.setdefault(name, method)
     del q.values[i - 1 : i + 3], q.nodes[i - 1 : i + 3]

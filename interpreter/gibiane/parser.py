@@ -1,8 +1,8 @@
 """The LALR parser of one instruction: built by lark from grammar.lark, or read from the table made beforehand.
 
 Building takes as long as all the rest of the start; `grammar.json` holds what lark would build. It is used when it
-was made from this grammar by this version of lark, else the parser is built from the grammar. `python -m gibiane.parser`
-writes it anew; a test says when it is stale.
+was made from this grammar by this version of lark, else the parser is built from the grammar.
+`python -m gibiane.parser` writes it anew; a test says when it is stale.
 """
 
 from __future__ import annotations
@@ -66,7 +66,9 @@ def parser() -> Lark:
     if table.get("lark") == lark.__version__ and table.get("grammar") == GRAMMAR.read_text(encoding="utf-8"):
         data = _with_numbers(table["data"])
         data["options"]["lexer"] = data["parser"]["lexer_conf"]["lexer_type"] = _Ready
-        loaded: Lark = Lark._load_from_dict(data, _with_numbers(table["memo"]), transformer=_Build())
+        loaded: Lark = Lark._load_from_dict(  # type: ignore[no-untyped-call]
+            data, _with_numbers(table["memo"]), transformer=_Build()
+        )
         return loaded
     return built()
 

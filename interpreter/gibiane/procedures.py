@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gibiane import compiled, slips
 from gibiane.binding import ABSENT, Operands
@@ -10,12 +10,10 @@ from gibiane.blocks import annotate, check_structure
 from gibiane.diagnostics import GibianeError, make
 from gibiane.frames import Frame
 from gibiane.nodes import Instr, Literal, Name, Node
+from gibiane.runner import Runner
 from gibiane.source import SourceText, Span
-from gibiane.syntax import parse
+from gibiane.syntax import parse, refuse_long
 from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Parameter, Procedure, Table
-
-if TYPE_CHECKING:
-    from gibiane.evaluator import Evaluator
 
 MAX_DEPTH = 500
 ECHO_PROCEDURES = 2  # the level of OPTI ECHO that shows the lines of procedure files
@@ -36,8 +34,14 @@ def parameters(instr: Instr, items: list[Node]) -> list[Parameter]:
     while i < len(items):
         name = items[i].name if isinstance(items[i], Name) else _word(items[i])  # type: ignore[attr-defined]
         if name is None or name in ("*", "/"):
-            raise GibianeError(make(37, "the name of an argument is wanted here", span=instr.at(items[i]),
-                                    hint="arguments are declared as NAME*TYPE, or NAME/TYPE when optional"))
+            raise GibianeError(
+                make(
+                    37,
+                    "the name of an argument is wanted here",
+                    span=instr.at(items[i]),
+                    hint="arguments are declared as NAME*TYPE, or NAME/TYPE when optional",
+                )
+            )
         i += 1
         mark = _word(items[i]) if i < len(items) else None
         if mark not in ("*", "/"):
@@ -55,13 +59,20 @@ def parameters(instr: Instr, items: list[Node]) -> list[Parameter]:
     return found
 
 
-def define(ev: Evaluator, program: list[Instr], pc: int) -> int:
+def define(ev: Runner, program: list[Instr], pc: int) -> int:
     """Store the procedure that starts at `pc` under its name; return the index after its FINP."""
     instr = program[pc]
     end = instr.jump
     if end is None:
-        raise GibianeError(make(1134, "this procedure is never closed", operator="DEBPROC", span=instr.span(),
-                                hint="write FINP and its results after the last instruction"))
+        raise GibianeError(
+            make(
+                1134,
+                "this procedure is never closed",
+                operator="DEBPROC",
+                span=instr.span(),
+                hint="write FINP and its results after the last instruction",
+            )
+        )
     problems = check_structure(program, pc + 1, end)
     if problems:
         raise GibianeError(problems[0])
@@ -70,13 +81,12 @@ def define(ev: Evaluator, program: list[Instr], pc: int) -> int:
         raise GibianeError(make(533, "a procedure needs a name", operator="DEBPROC", span=instr.span()))
     at = instr.items.index(items[1])
     name = (_word(items[1]) or "").upper()[:24]
-    procedure = Procedure(name, parameters(instr, instr.items[at + 1 :]), program, pc + 1, end,
-                          instr.head == "DEBM")
+    procedure = Procedure(name, parameters(instr, instr.items[at + 1 :]), program, pc + 1, end, instr.head == "DEBM")
     ev.assign_name(name, procedure, instr)
     return end + 1
 
 
-def load(ev: Evaluator, word: str) -> Procedure | None:
+def load(ev: Runner, word: str) -> Procedure | None:
     """Find the procedure `word` in a file, define everything the file holds in the session, and return it."""
     if not word[0].isalpha() and word[0] not in "@_":
         return None
@@ -86,15 +96,24 @@ def load(ev: Evaluator, word: str) -> Procedure | None:
     program = define_all(ev, source)
     found = ev.session.globals.names.get(word[:24])
     if not isinstance(found, Procedure):
-        raise GibianeError(make(1031, "{file} does not define the procedure {name}", file=source.name, name=word,
-                                span=program[0].span() if program else None,
-                                hint="the name after DEBP must be the name of the file"))
+        raise GibianeError(
+            make(
+                1031,
+                "{file} does not define the procedure {name}",
+                file=source.name,
+                name=word,
+                span=program[0].span() if program else None,
+                hint="the name after DEBP must be the name of the file",
+            )
+        )
     return found
 
 
-def define_all(ev: Evaluator, source: SourceText, only: str | None = None) -> list[Instr]:
+def define_all(ev: Runner, source: SourceText, only: str | None = None) -> list[Instr]:
     """Define every procedure of a file in the session, or that of one name; return the instructions of the file."""
     program = parse(source)
+    if ev.session.options["STRICT"]:
+        refuse_long(program)
     slips.mark(source, program)
     annotate(program)
     if ev.session.options["ECHO"] >= ECHO_PROCEDURES:
@@ -116,7 +135,7 @@ def define_all(ev: Evaluator, source: SourceText, only: str | None = None) -> li
     return program
 
 
-def import_file(ev: Evaluator, source: SourceText, name: str | None) -> None:
+def import_file(ev: Runner, source: SourceText, name: str | None) -> None:
     """Define the procedures of a file (LIRE 'PROC'), or make one, `name`, of a file that holds no DEBP."""
     program = parse(source)
     if any(instr.head in ("DEBP", "DEBM") for instr in program):
@@ -125,8 +144,14 @@ def import_file(ev: Evaluator, source: SourceText, name: str | None) -> None:
             raise GibianeError(make(9, "{file} defines no procedure {name}", file=source.name, name=name))
         return
     if name is None:
-        raise GibianeError(make(37, "{file} defines no procedure: the name of the one it becomes is wanted",
-                                file=source.name, hint="LIRE 'PROC' 'file' 'NAME' ;"))
+        raise GibianeError(
+            make(
+                37,
+                "{file} defines no procedure: the name of the one it becomes is wanted",
+                file=source.name,
+                hint="LIRE 'PROC' 'file' 'NAME' ;",
+            )
+        )
     slips.mark(source, program)
     whole = [*parse(SourceText(source.name, f"DEBP {name} ;")), *program, *parse(SourceText(source.name, "FINP ;"))]
     annotate(whole)
@@ -140,12 +165,12 @@ def import_file(ev: Evaluator, source: SourceText, name: str | None) -> None:
         ev.frame = outer
 
 
-def call(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> None:
+def call(ev: Runner, procedure: Procedure, q: Operands, node: Node) -> None:
     """Call a procedure with operands read from the caller's queue; push its results in front."""
     q.push_front(results(ev, procedure, q, node), node)
 
 
-def results(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> list[Any]:
+def results(ev: Runner, procedure: Procedure, q: Operands, node: Node) -> list[Any]:
     """Call a procedure with operands read from the caller's queue; return its results."""
     span = q.span(node)
     frame = _enter(ev, procedure, q.source, node)
@@ -155,21 +180,35 @@ def results(ev: Evaluator, procedure: Procedure, q: Operands, node: Node) -> lis
     return _run(ev, frame, procedure, q.source, node)
 
 
-def _enter(ev: Evaluator, procedure: Procedure, source: SourceText, node: Node) -> Frame:
+def _enter(ev: Runner, procedure: Procedure, source: SourceText, node: Node) -> Frame:
     """Return the frame of a new call, on top of the current one."""
     if ev.frame.depth >= MAX_DEPTH:
-        raise GibianeError(make("G103", "calls are nested deeper than {limit}: does {name} call itself without end?",
-                                limit=MAX_DEPTH, name=procedure.name, span=Span(source, node.start, node.end)))
+        raise GibianeError(
+            make(
+                "G103",
+                "calls are nested deeper than {limit}: does {name} call itself without end?",
+                limit=MAX_DEPTH,
+                name=procedure.name,
+                span=Span(source, node.start, node.end),
+            )
+        )
     frame = Frame(ev, ev.frame, procedure)
     if procedure.is_method:
         if procedure.this is None:
-            raise GibianeError(make(153, "the method {name} is called on an object", name=procedure.name,
-                                    span=Span(source, node.start, node.end), hint="O % {name} where O is an OBJET"))
+            raise GibianeError(
+                make(
+                    153,
+                    "the method {name} is called on an object",
+                    name=procedure.name,
+                    span=Span(source, node.start, node.end),
+                    hint="O % {name} where O is an OBJET",
+                )
+            )
         frame.this = procedure.this
     return frame
 
 
-def _run(ev: Evaluator, frame: Frame, procedure: Procedure, source: SourceText, node: Node) -> list[Any]:
+def _run(ev: Runner, frame: Frame, procedure: Procedure, source: SourceText, node: Node) -> list[Any]:
     """Run the body of the procedure of a frame whose arguments are set; return its results."""
     caller, instr = ev.frame, ev.current
     ev.frame = frame
@@ -199,7 +238,7 @@ def _run(ev: Evaluator, frame: Frame, procedure: Procedure, source: SourceText, 
     return frame.results
 
 
-def _keep_locals(ev: Evaluator, frame: Frame, procedure: Procedure) -> None:
+def _keep_locals(ev: Runner, frame: Frame, procedure: Procedure) -> None:
     """Keep the names of a finished call in the table `&NAME` (OPTI LOCA)."""
     kept = Table()
     for name, value in frame.names.items():
@@ -208,7 +247,9 @@ def _keep_locals(ev: Evaluator, frame: Frame, procedure: Procedure) -> None:
     ev.frame.names["&" + procedure.name[:23]] = kept
 
 
-def call_with_numbers(ev: Evaluator, procedure: Procedure, values: list[Any], instr: Instr, node: Node) -> list[Any] | None:
+def call_with_numbers(
+    ev: Runner, procedure: Procedure, values: list[Any], instr: Instr, node: Node
+) -> list[Any] | None:
     """Call a procedure with numbers that are its parameters one by one; None when they are not (nothing has run)."""
     parameters = procedure.parameters
     if len(parameters) != len(values):
@@ -226,8 +267,7 @@ def call_with_numbers(ev: Evaluator, procedure: Procedure, values: list[Any], in
     return _run(ev, frame, procedure, instr.source, node)
 
 
-def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, procedure: Procedure,
-                    span: Span) -> None:
+def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, procedure: Procedure, span: Span) -> None:
     wanted = (parameter.type_name,) if parameter.type_name else (ANY,)
     value, _ = q.take(wanted, parameter.subtype)
     if value is ABSENT:
@@ -236,8 +276,15 @@ def _read_parameter(names: dict[str, Any], parameter: Parameter, q: Operands, pr
             if parameter.subtype:
                 what = f"{what} {parameter.subtype}"
             labels = [q.describe(0, what)] if q.values else []
-            diag = make(1121, "argument {argument} is missing: a {what} is wanted", argument=parameter.name, what=what,
-                        operator=procedure.name, span=labels[0].span if labels else span, labels=labels)
+            diag = make(
+                1121,
+                "argument {argument} is missing: a {what} is wanted",
+                argument=parameter.name,
+                what=what,
+                operator=procedure.name,
+                span=labels[0].span if labels else span,
+                labels=labels,
+            )
             diag.forms = [usage(procedure)]
             raise GibianeError(diag)
         value = NOTHING
@@ -256,14 +303,17 @@ def usage(procedure: Procedure) -> str:
     return " ".join([procedure.name, *parts, ";"])
 
 
-def results_of(ev: Evaluator, instr: Instr, items: list[Node], *, skip_undefined: bool = False) -> list[Any]:
+def results_of(ev: Runner, instr: Instr, items: list[Node], *, skip_undefined: bool = False) -> list[Any]:
     """Evaluate the operands of FINP or RESP: everything they leave is a result."""
     if items and items is instr.items:
         items = [i for n, i in enumerate(items) if n != _head_position(instr)]
     q = ev.operands(instr.source, items)
     if skip_undefined:
-        kept = [i for i, (v, n) in enumerate(zip(q.values, q.nodes, strict=True))
-                if not (isinstance(n, Name) and v == n.word)]
+        kept = [
+            i
+            for i, (v, n) in enumerate(zip(q.values, q.nodes, strict=True))
+            if not (isinstance(n, Name) and v == n.word)
+        ]
         q.values, q.nodes = [q.values[i] for i in kept], [q.nodes[i] for i in kept]
     ev.evaluate(q, 2)  # two targets or more: bare numbers are results, not a point
     return q.values
@@ -273,12 +323,11 @@ def _head_position(instr: Instr) -> int:
     return next(n for n, i in enumerate(instr.items) if (_word(i) or "")[:4] == instr.head)
 
 
-def read_arguments(ev: Evaluator, instr: Instr, items: list[Node]) -> None:
+def read_arguments(ev: Runner, instr: Instr, items: list[Node]) -> None:
     """Run ARGU: read more arguments from what is still unread in the caller's queue."""
     frame = ev.frame
     if frame.procedure is None:
-        raise GibianeError(make(153, "it stands inside a procedure only", operator="ARGUMENT",
-                                span=instr.span()))
+        raise GibianeError(make(153, "it stands inside a procedure only", operator="ARGUMENT", span=instr.span()))
     unread = frame.arguments or Operands(ev.session, instr.source, [], [])
     for parameter in parameters(instr, items):
         _read_parameter(frame.names, parameter, unread, frame.procedure, instr.span())

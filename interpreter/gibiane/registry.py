@@ -16,7 +16,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from gibiane.binding import Mismatch, Operands, bind, explain
 from gibiane.diagnostics import Diagnostic, GibianeError, Label, Text, make
@@ -24,15 +24,24 @@ from gibiane.forms import Arg, Form, Function, Key
 from gibiane.nodes import Node
 from gibiane.values import ANY
 
-if TYPE_CHECKING:
-    from gibiane.session import Session
-
 
 class Operator:
     """An operator: its description and its forms, some of them loaded when first needed."""
 
-    def __init__(self, name: str, *, topic: str, summary: str, notice: str, example: str, see: Sequence[str],
-                 source: str, whole: bool, terminal: bool, symbolic: bool) -> None:
+    def __init__(
+        self,
+        name: str,
+        *,
+        topic: str,
+        summary: str,
+        notice: str,
+        example: str,
+        see: Sequence[str],
+        source: str,
+        whole: bool,
+        terminal: bool,
+        symbolic: bool,
+    ) -> None:
         self.name = name
         self.topic = topic
         self.summary = summary
@@ -61,8 +70,9 @@ class Operator:
 
         return declare
 
-    def stream(self, *parts: Arg | Key, syntax: str, gives: Sequence[str] = (),
-               last: bool = False) -> Callable[[Function], Function]:
+    def stream(
+        self, *parts: Arg | Key, syntax: str, gives: Sequence[str] = (), last: bool = False
+    ) -> Callable[[Function], Function]:
         """Declare a form that reads the queue itself: the function gets the context and the operands.
 
         `parts` still lists every keyword, for INFO and completion.
@@ -98,7 +108,7 @@ class Operator:
             pass
         return self.forms
 
-    def run(self, session: Session, q: Operands, node: Node) -> None:
+    def run(self, session: Any, q: Operands, node: Node) -> None:
         """Read operands from the queue by the first form that fits, run it, push its results in front."""
         if session.interactive and "?" in q.values:
             self.answer(session, q)
@@ -129,10 +139,9 @@ class Operator:
             tried = (*tried, *self.forms[:i])
             i = 0
             if not self.load_more():
-                raise explain(self, misses, q)
+                raise explain(self.name, misses, q, symbolic=self.symbolic)
 
-
-    def answer(self, session: Session, q: Operands) -> None:
+    def answer(self, session: Any, q: Operands) -> None:
         """Write the forms and keywords, asked for by `?` among the operands at the prompt; nothing is run."""
         for form in self.all_forms():
             session.write("   " + form.usage(self.name))
@@ -169,8 +178,9 @@ class Context:
 
     __slots__ = ("node", "operands", "operator", "places", "session")
 
-    def __init__(self, session: Session, operator: Operator, operands: Operands, node: Node,
-                 places: dict[str, Node]) -> None:
+    def __init__(
+        self, session: Any, operator: Operator, operands: Operands, node: Node, places: dict[str, Node]
+    ) -> None:
         self.session = session
         self.operator = operator
         self.operands = operands
@@ -180,7 +190,8 @@ class Context:
     @property
     def state(self) -> dict[str, Any]:
         """The place where operator packages keep what belongs to the session."""
-        return self.session.state
+        state: dict[str, Any] = self.session.state
+        return state
 
     def option(self, name: str) -> Any:
         """Return the value of an option (OPTI)."""
@@ -190,14 +201,24 @@ class Context:
         """Write a line of output."""
         self.session.write(line)
 
-    def diagnostic(self, code: int | str, template: str, *, at: str | None = None, label: str | None = None,
-                   hint: str | None = None, level: int | None = None, **fields: Any) -> Diagnostic:
+    def diagnostic(
+        self,
+        code: int | str,
+        template: str,
+        *,
+        at: str | None = None,
+        label: str | None = None,
+        hint: str | None = None,
+        level: int | None = None,
+        **fields: Any,
+    ) -> Diagnostic:
         """Build a diagnostic about operand `at` (a declared name), or about the operator's word."""
         node = self.places.get(at, self.node) if at else self.node
         span = self.operands.span(node)
         labels = [Label(span, Text(label, fields))] if label else []
-        return make(code, template, operator=self.operator.name, span=span, labels=labels, hint=hint, level=level,
-                    **fields)
+        return make(
+            code, template, operator=self.operator.name, span=span, labels=labels, hint=hint, level=level, **fields
+        )
 
     def fail(self, code: int | str, template: str, **options: Any) -> NoReturn:
         """Raise an error; options as for :meth:`diagnostic`."""
@@ -209,7 +230,8 @@ class Context:
 
     def call(self, procedure: Any, *arguments: Any) -> list[Any]:
         """Call a procedure (an object or its name) with arguments; return its results."""
-        return self.session.call(procedure, list(arguments), self.operands.span(self.node))
+        results: list[Any] = self.session.call(procedure, list(arguments), self.operands.span(self.node))
+        return results
 
 
 CATALOGUE: dict[str, Operator] = {}
@@ -230,18 +252,53 @@ def _register(op: Operator) -> Operator:
     return op
 
 
-def operator(name: str, *, topic: str, summary: str, notice: str = "", example: str = "", see: Sequence[str] = (),
-             source: str = "", whole: bool = False, terminal: bool = False) -> Operator:
+def operator(
+    name: str,
+    *,
+    topic: str,
+    summary: str,
+    notice: str = "",
+    example: str = "",
+    see: Sequence[str] = (),
+    source: str = "",
+    whole: bool = False,
+    terminal: bool = False,
+) -> Operator:
     """Declare an operator by its name; the first four letters are its key, or the whole name with `whole`."""
-    return _register(Operator(name, topic=topic, summary=summary, notice=notice, example=example, see=see,
-                              source=source, whole=whole, terminal=terminal, symbolic=False))
+    return _register(
+        Operator(
+            name,
+            topic=topic,
+            summary=summary,
+            notice=notice,
+            example=example,
+            see=see,
+            source=source,
+            whole=whole,
+            terminal=terminal,
+            symbolic=False,
+        )
+    )
 
 
-def infix(name: str, *, topic: str, summary: str, notice: str = "", example: str = "",
-          see: Sequence[str] = ()) -> Operator:
+def infix(
+    name: str, *, topic: str, summary: str, notice: str = "", example: str = "", see: Sequence[str] = ()
+) -> Operator:
     """Declare an operator written as a symbol (`+`, `<EG`), or one that errors treat like it (EGA)."""
-    return _register(Operator(name, topic=topic, summary=summary, notice=notice, example=example, see=see, source="",
-                              whole=False, terminal=False, symbolic=True))
+    return _register(
+        Operator(
+            name,
+            topic=topic,
+            summary=summary,
+            notice=notice,
+            example=example,
+            see=see,
+            source="",
+            whole=False,
+            terminal=False,
+            symbolic=True,
+        )
+    )
 
 
 def extend(name: str) -> Operator:
@@ -289,7 +346,7 @@ def _find_cached(word: str) -> Operator | None:
     if found is not None:
         return found
     for name, modules in _MODULES.items():
-        if name[:4] == key and (name not in WHOLE_NAMES) or (name in WHOLE_NAMES and word.startswith(name)):
+        if (name[:4] == key and (name not in WHOLE_NAMES)) or (name in WHOLE_NAMES and word.startswith(name)):
             import_module(modules[0])
             declared = CATALOGUE.get(key) or LONG.get(name)
             if declared is None:

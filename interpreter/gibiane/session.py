@@ -16,7 +16,7 @@ from gibiane.frames import Frame, Resume, Stop
 from gibiane.library import Library, read_script
 from gibiane.nodes import Instr
 from gibiane.source import SourceText, Span
-from gibiane.syntax import parse
+from gibiane.syntax import parse, refuse_long
 from gibiane.values import PREDEFINED, Value, type_of
 
 EXIT_CODES = {0: 0, 1: 4, 2: 8, 3: 12}
@@ -29,9 +29,25 @@ RECURSION_LIMIT = 12_000
 
 def default_options() -> dict[str, Any]:
     """Return the options of a new session (OPTI)."""
-    return {"DIME": 0, "MODE": None, "ELEM": None, "DENS": 0.0, "ECHO": 0, "ERRE": "NORM", "LANG": None, "LOCA": False,
-            "WARN": False, "EXEC": False, "STRICT": False, "PREC": sys.float_info.epsilon,
-            "PETI": sys.float_info.min, "GRAN": sys.float_info.max, "TRAC": "PNG", "COUL": "DEFA"}
+    return {
+        "DIME": 0,
+        "MODE": None,
+        "ELEM": None,
+        "DENS": 0.0,
+        "ECHO": 0,
+        "ERRE": "NORM",
+        "LANG": None,
+        "LOCA": False,
+        "DEBU": 0,
+        "WARN": False,
+        "EXEC": False,
+        "STRICT": False,
+        "PREC": sys.float_info.epsilon,
+        "PETI": sys.float_info.min,
+        "GRAN": sys.float_info.max,
+        "TRAC": "PNG",
+        "COUL": "DEFA",
+    }
 
 
 class Session:
@@ -47,8 +63,9 @@ class Session:
         Colour in messages.
     """
 
-    def __init__(self, *, out: TextIO | None = None, err: TextIO | None = None, interactive: bool = False,
-                 colour: bool = False) -> None:
+    def __init__(
+        self, *, out: TextIO | None = None, err: TextIO | None = None, interactive: bool = False, colour: bool = False
+    ) -> None:
         sys.set_int_max_str_digits(0)  # an ENTIER has no largest value
         self.out = out if out is not None else sys.stdout
         self.err = err if err is not None else sys.stderr
@@ -187,7 +204,7 @@ class Session:
             return None
 
     def _run(self, source: SourceText) -> int:
-        program = _program(source)
+        program = self._program(source)
         previous = self.library.directory
         if source.directory is not None:
             self.library.directory = source.directory
@@ -216,9 +233,18 @@ class Session:
         finally:
             sys.setrecursionlimit(limit)
             self.library.directory = previous
-            self.evaluator.unwind()
+            self.evaluator.unwind(stay=self.interactive and bool(self.options["DEBU"]))
             self.out.flush()
         return INTERNAL_FAILURE if self.internal else EXIT_CODES[self.worst]
+
+    def _program(self, source: SourceText) -> list[Instr]:
+        """Parse a text, look for slips in it, match its blocks."""
+        program = parse(source)
+        if self.options["STRICT"]:
+            refuse_long(program)
+        slips.mark(source, program)
+        annotate(program)
+        return program
 
     def switch_input(self, source: str | int, span: Span) -> None:
         """Do what OPTI DONN asks: read the instructions of a file now, or leave what is being read.
@@ -238,7 +264,7 @@ class Session:
             raise error("G103", "files are read one inside another more than {limit} deep", limit=MAX_INCLUDED)
         self._included += 1
         try:
-            self.evaluator.run(_program(text))
+            self.evaluator.run(self._program(text))
         except Resume:
             if self.handed_over:
                 raise
@@ -252,9 +278,16 @@ class Session:
         """Turn an unforeseen Python error into G900: the user gets a sentence, --debug the traceback."""
         self.internal = True
         instr = self.evaluator.current
-        self.emit(make("G900", "internal failure: {kind}: {text}", kind=type(failure).__name__, text=str(failure),
-                       span=instr.span() if instr is not None else None,
-                       hint="this is a fault of the program: please report it with this script (--debug shows more)"))
+        self.emit(
+            make(
+                "G900",
+                "internal failure: {kind}: {text}",
+                kind=type(failure).__name__,
+                text=str(failure),
+                span=instr.span() if instr is not None else None,
+                hint="this is a fault of the program: please report it with this script (--debug shows more)",
+            )
+        )
         if self.debug:
             raise failure
 
@@ -279,14 +312,6 @@ def _value(text: str) -> Any:
         except ValueError:
             continue
     return text
-
-
-def _program(source: SourceText) -> list[Instr]:
-    """Parse a text, look for slips in it, match its blocks."""
-    program = parse(source)
-    slips.mark(source, program)
-    annotate(program)
-    return program
 
 
 def load_operators(session: Session) -> None:

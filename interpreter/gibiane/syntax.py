@@ -12,6 +12,8 @@ from gibiane.nodes import NAME_LENGTH, Access, Group, Instr, Literal, Name, Node
 from gibiane.parser import leaf, parser
 from gibiane.source import SourceText, Span
 
+LONGEST_INSTRUCTION = 500
+
 
 class SyntaxFailure(Exception):
     """A syntax error inside one instruction."""
@@ -39,12 +41,35 @@ def parse(source: SourceText, start: int = 0) -> list[Instr]:
         instr = _instruction(source, held, held[-1].end_pos, errors)
         if instr.bad is None or instr.bad.code == "1":
             last = Span(source, held[-1].start_pos, held[-1].end_pos)
-            instr.bad = make("G102", "the text ends before the `;` of this instruction", span=last,
-                             hint="close the instruction with ;")
+            instr.bad = make(
+                "G102",
+                "the text ends before the `;` of this instruction",
+                span=last,
+                hint="close the instruction with ;",
+            )
         program.append(instr)
     elif errors:
         program.append(_instruction(source, [], len(source.text), errors))
     return program
+
+
+def refuse_long(program: list[Instr]) -> None:
+    """Mark the instructions that Cast3M finds too long, comments not counted (--strict)."""
+    for instr in program:
+        if instr.bad is None and instr.end - instr.start > LONGEST_INSTRUCTION:
+            text = instr.source.text[instr.start : instr.end]
+            length = sum(len(line) for line in text.split("\n") if not line.startswith("*"))
+            if length > LONGEST_INSTRUCTION:
+                last = Span(instr.source, max(instr.end - 1, instr.start), instr.end)
+                instr.bad = make(
+                    3,
+                    "an instruction of {length} characters: Cast3M reads {most}",
+                    length=length,
+                    most=LONGEST_INSTRUCTION,
+                    span=last,
+                    labels=[Label(last, Text("it ends here"))],
+                    hint="split it; without --strict any length is accepted",
+                )
 
 
 def _instruction(source: SourceText, held: list[Token], end: int, errors: dict[int, Diagnostic]) -> Instr:
@@ -91,20 +116,37 @@ def _explain(source: SourceText, held: list[Token], bad: Any) -> Diagnostic:
         elif token.type == "EQUAL":
             equals += 1
     if bad.type == "RPAR":
-        return make(2, "this closing parenthesis has no opening one", span=Span(source, bad.start_pos, bad.end_pos),
-                    hint="remove it, or write the missing ( before it")
+        return make(
+            2,
+            "this closing parenthesis has no opening one",
+            span=Span(source, bad.start_pos, bad.end_pos),
+            hint="remove it, or write the missing ( before it",
+        )
     if bad.type == "EQUAL" and equals:
-        return make(1014, "a second = in one instruction", span=Span(source, bad.start_pos, bad.end_pos),
-                    hint="is the ; of the instruction before it missing? To compare two values: A EGA B")
+        return make(
+            1014,
+            "a second = in one instruction",
+            span=Span(source, bad.start_pos, bad.end_pos),
+            hint="is the ; of the instruction before it missing? To compare two values: A EGA B",
+        )
     if bad.type == "EQUAL":
-        return make(1014, "an = inside a parenthesis", span=Span(source, bad.start_pos, bad.end_pos),
-                    hint="assign in an instruction of its own; to compare two values: A EGA B")
+        return make(
+            1014,
+            "an = inside a parenthesis",
+            span=Span(source, bad.start_pos, bad.end_pos),
+            hint="assign in an instruction of its own; to compare two values: A EGA B",
+        )
     opening, last = (Span(source, token.start_pos, token.end_pos) for token in (depth[-1], held[-1]))
     labels = [Label(opening, Text("opened here"))]
     if last.line != opening.line:
         labels.append(Label(last, Text("the instruction ends here")))
-    return make(1, "this parenthesis is not closed before the end of the instruction", span=opening, labels=labels,
-                hint="write the missing ) before the ;")
+    return make(
+        1,
+        "this parenthesis is not closed before the end of the instruction",
+        span=opening,
+        labels=labels,
+        hint="write the missing ) before the ;",
+    )
 
 
 def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Target]:
@@ -123,12 +165,24 @@ def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Ta
             target = Target(name, item.start, item.end)
             i += 1
         else:
-            raise SyntaxFailure(make(315, "this cannot be given a value", span=Span(source, item.start, item.end),
-                                     hint="on the left of = stand names and table elements: A T.'X' = ..."))
+            raise SyntaxFailure(
+                make(
+                    315,
+                    "this cannot be given a value",
+                    span=Span(source, item.start, item.end),
+                    hint="on the left of = stand names and table elements: A T.'X' = ...",
+                )
+            )
         while i < len(items) and isinstance(access := items[i], Access):
             if i + 1 == len(items) or isinstance(items[i + 1], Access):
-                raise SyntaxFailure(make(1043, "an index is missing after {symbol}", symbol=access.symbol,
-                                         span=Span(source, access.start, access.end)))
+                raise SyntaxFailure(
+                    make(
+                        1043,
+                        "an index is missing after {symbol}",
+                        symbol=access.symbol,
+                        span=Span(source, access.start, access.end),
+                    )
+                )
             target.path.append((access.symbol, items[i + 1]))
             target.end = items[i + 1].end
             i += 2
@@ -143,13 +197,20 @@ def _targets(source: SourceText, left: list[Node], held: list[Token]) -> list[Ta
             target.end = wanted.end
             i += 2
         if target.name.startswith("#") and not target.path:
-            raise SyntaxFailure(make(315, "names that begin with # are reserved",
-                                     span=Span(source, target.start, target.end)))
+            raise SyntaxFailure(
+                make(315, "names that begin with # are reserved", span=Span(source, target.start, target.end))
+            )
         targets.append(target)
     if not targets:
         equal = next(t for t in held if t.type == "EQUAL")
-        raise SyntaxFailure(make(315, "nothing stands before the =", span=Span(source, equal.start_pos, equal.end_pos),
-                                 hint="write the name of the result before it"))
+        raise SyntaxFailure(
+            make(
+                315,
+                "nothing stands before the =",
+                span=Span(source, equal.start_pos, equal.end_pos),
+                hint="write the name of the result before it",
+            )
+        )
     return targets
 
 

@@ -100,8 +100,15 @@ class Procedure(Value):
 
     type_name = PROCEDUR
 
-    def __init__(self, name: str, parameters: list[Parameter], program: list[Instr], start: int, end: int,
-                 is_method: bool = False) -> None:
+    def __init__(
+        self,
+        name: str,
+        parameters: list[Parameter],
+        program: list[Instr],
+        start: int,
+        end: int,
+        is_method: bool = False,
+    ) -> None:
         self.name = name
         self.parameters = parameters
         self.program = program
@@ -165,10 +172,19 @@ class Table(Value):
             close = next((w for w in words if w.upper() == index.upper()), None)
         shown = f"'{index}'" if isinstance(index, str) else index if isinstance(index, int | float) else type_of(index)
         if close:
-            raise error(code, "the table has no index {index}", index=shown, close=close,
-                        hint="did you mean '{close}'? An unquoted word is folded to upper case")
-        raise error(code, "the table has no index {index}", index=shown,
-                    hint="EXIS T index tells whether an index exists; LIST T shows them")
+            raise error(
+                code,
+                "the table has no index {index}",
+                index=shown,
+                close=close,
+                hint="did you mean '{close}'? An unquoted word is folded to upper case",
+            )
+        raise error(
+            code,
+            "the table has no index {index}",
+            index=shown,
+            hint="EXIS T index tells whether an index exists; LIST T shows them",
+        )
 
     def set(self, index: Any, value: Any) -> None:
         """Set or replace the value at `index`."""

@@ -14,21 +14,46 @@ NUMBER = (ENTIER, FLOTTANT)
 A, B = Arg("a", NUMBER, "first number"), Arg("b", NUMBER, "second number")
 
 
-def _number_infix(name: str, summary: str, example: str, *, gives: str = "ENTIER|FLOTTANT", topic: str = "arithmetic",
-                  notice: str = "") -> Operator:
-    return infix(name, topic=topic, summary=summary, example=example, notice=notice or (
-        "Two ENTIER give an ENTIER, any other two numbers a FLOTTANT. There is no precedence: operations are done "
-        "from left to right, and parentheses change that."))
+def _number_infix(
+    name: str,
+    summary: str,
+    example: str,
+    *,
+    gives: str = "ENTIER|FLOTTANT",
+    topic: str = "arithmetic",
+    notice: str = "",
+) -> Operator:
+    return infix(
+        name,
+        topic=topic,
+        summary=summary,
+        example=example,
+        notice=notice
+        or (
+            "Two ENTIER give an ENTIER, any other two numbers a FLOTTANT. There is no precedence: operations are done "
+            "from left to right, and parentheses change that."
+        ),
+    )
 
 
 PLUS = _number_infix("+", "add", "MESS (1 + 2 * 3) ;")
 MINUS = _number_infix("-", "subtract", "MESS (7 - 2) ;")
 TIMES = _number_infix("*", "multiply", "MESS (2. * 3.) ;")
-OVER = infix("/", topic="arithmetic", summary="divide", example="MESS (7 / 2) ' ' (7. / 2) ;",
-             notice="The quotient of two ENTIER is an ENTIER, truncated towards zero: 7/2 is 3, -7/2 is -3.")
-POWER = infix("**", topic="arithmetic", summary="raise to a power", example="MESS (2 ** 10) ' ' (2. ** -1) ;",
-              notice="The power of a number that is not positive needs an ENTIER exponent (error 213). An ENTIER to a "
-                     "negative ENTIER power is a FLOTTANT.")
+OVER = infix(
+    "/",
+    topic="arithmetic",
+    summary="divide",
+    example="MESS (7 / 2) ' ' (7. / 2) ;",
+    notice="The quotient of two ENTIER is an ENTIER, truncated towards zero: 7/2 is 3, -7/2 is -3.",
+)
+POWER = infix(
+    "**",
+    topic="arithmetic",
+    summary="raise to a power",
+    example="MESS (2 ** 10) ' ' (2. ** -1) ;",
+    notice="The power of a negative number needs an ENTIER exponent (error 213). An ENTIER to a "
+    "negative ENTIER power is a FLOTTANT.",
+)
 
 
 @PLUS.form(A, B, gives=["ENTIER|FLOTTANT"])
@@ -65,10 +90,9 @@ def _over(ctx: Context, a: Any, b: Any) -> Any:
 def _power(ctx: Context, a: Any, b: Any) -> Any:
     if a == 0 and b < 0:
         ctx.fail(26, "zero to a negative power", at="a")
-    if type(b) is float and a <= 0:
+    if type(b) is float and a < 0:
         hint = "an ENTIER exponent is allowed: {a} ** {whole}" if b == int(b) else "ABS gives the absolute value"
-        ctx.fail(213, "a real power of a number that is not positive ({a} ** {b})", at="a", a=a, b=b, hint=hint,
-                 whole=int(b))
+        ctx.fail(213, "a real power of a negative number ({a} ** {b})", at="a", a=a, b=b, hint=hint, whole=int(b))
     if type(a) is int and type(b) is int and b > 0 and abs(a) > 1 and b * math.log2(abs(a)) > 100_000:
         ctx.fail(26, "{a} ** {b} is too large", at="b", a=a, b=b)
     try:
@@ -78,9 +102,14 @@ def _power(ctx: Context, a: Any, b: Any) -> Any:
 
 
 def _comparison(name: str, summary: str, holds: Callable[[Any, Any], bool]) -> Operator:
-    op = infix(name, topic="logic", summary=summary, example=f"MESS (2 {name} 3.) ;",
-               notice="Compares two numbers; the result is a LOGIQUE. With lists: does it hold for every value? "
-                      "MASQ tells for which ones.")
+    op = infix(
+        name,
+        topic="logic",
+        summary=summary,
+        example=f"MESS (2 {name} 3.) ;",
+        notice="Compares two numbers; the result is a LOGIQUE. With lists: does it hold for every value? "
+        "MASQ tells for which ones.",
+    )
 
     @op.form(A, B, gives=[LOGIQUE])
     def _compare(ctx: Context, a: Any, b: Any) -> bool:
@@ -95,10 +124,15 @@ MORE = _comparison(">", "is greater than", lambda a, b: a > b)
 LESS_EQUAL = _comparison("<EG", "is less than or equal to", lambda a, b: a <= b)
 MORE_EQUAL = _comparison(">EG", "is greater than or equal to", lambda a, b: a >= b)
 
-ENTI = operator("ENTIER", topic="arithmetic", summary="make an ENTIER of a number or a word",
-                notice="Truncates by default; 'PROC' rounds to the nearest (halves away from zero), 'INFE' down, "
-                       "'SUPE' up. A MOT is read as a number.",
-                example="MESS (ENTI 'PROC' 2.5) (ENTI '12') ;", see=["FLOTTANT"])
+ENTI = operator(
+    "ENTIER",
+    topic="arithmetic",
+    summary="make an ENTIER of a number or a word",
+    notice="Truncates by default; 'PROC' rounds to the nearest (halves away from zero), 'INFE' down, "
+    "'SUPE' up. A MOT is read as a number.",
+    example="MESS (ENTI 'PROC' 2.5) (ENTI '12') ;",
+    see=["FLOTTANT"],
+)
 
 
 def _parse(ctx: Context, word: str, kind: type) -> Any:
@@ -113,7 +147,7 @@ def _enti(ctx: Context, x: float, how: str | None) -> int:
     if not math.isfinite(x):
         ctx.fail(26, "{x} has no integer value", at="x", x=x)
     if how == "PROC":
-        return int(math.floor(abs(x) + 0.5)) * (1 if x >= 0 else -1)
+        return math.floor(abs(x) + 0.5) * (1 if x >= 0 else -1)
     if how == "INFE":
         return math.floor(x)
     return math.ceil(x) if how == "SUPE" else int(x)
@@ -124,8 +158,14 @@ def _enti_word(ctx: Context, x: str) -> int:
     return int(_parse(ctx, x, float))
 
 
-FLOT = operator("FLOTTANT", topic="arithmetic", summary="make a FLOTTANT of a number or a word",
-                notice="A MOT is read as a number.", example="MESS (FLOT 3) ;", see=["ENTIER"])
+FLOT = operator(
+    "FLOTTANT",
+    topic="arithmetic",
+    summary="make a FLOTTANT of a number or a word",
+    notice="A MOT is read as a number.",
+    example="MESS (FLOT 3) ;",
+    see=["ENTIER"],
+)
 
 
 @FLOT.form(Arg("x", FLOTTANT, "number"), gives=[FLOTTANT])
@@ -138,8 +178,13 @@ def _flot_word(ctx: Context, x: str) -> float:
     return float(_parse(ctx, x, float))
 
 
-ABS = operator("ABS", topic="arithmetic", summary="absolute value", notice="Keeps the type of its operand.",
-               example="MESS (ABS -3) ;")
+ABS = operator(
+    "ABS",
+    topic="arithmetic",
+    summary="absolute value",
+    notice="Keeps the type of its operand.",
+    example="MESS (ABS -3) ;",
+)
 
 
 @ABS.form(Arg("x", NUMBER, "number"), gives=["ENTIER|FLOTTANT"])
@@ -147,8 +192,13 @@ def _abs(ctx: Context, x: Any) -> Any:
     return abs(x)
 
 
-SIGN = operator("SIGNE", topic="arithmetic", summary="sign of a number: -1, 0 or 1",
-                notice="Keeps the type of its operand.", example="MESS (SIGN -3.5) ;")
+SIGN = operator(
+    "SIGNE",
+    topic="arithmetic",
+    summary="sign of a number: -1, 0 or 1",
+    notice="Keeps the type of its operand.",
+    example="MESS (SIGN -3.5) ;",
+)
 
 
 @SIGN.form(Arg("x", NUMBER, "number"), gives=["ENTIER|FLOTTANT"])
@@ -165,14 +215,21 @@ def _exact(function: Callable[[float], float], table: dict[float, float], period
 
 
 FUNCTIONS: dict[str, tuple[str, Callable[[float], float], Callable[[float], bool] | None]] = {
-    "SIN": ("sine of an angle in degrees",
-            _exact(math.sin, {0: 0.0, 30: 0.5, 90: 1.0, 150: 0.5, 180: 0.0, 210: -0.5, 270: -1.0, 330: -0.5}, 360.0),
-            None),
-    "COS": ("cosine of an angle in degrees",
-            _exact(math.cos, {0: 1.0, 60: 0.5, 90: 0.0, 120: -0.5, 180: -1.0, 240: -0.5, 270: 0.0, 300: 0.5}, 360.0),
-            None),
-    "TAN": ("tangent of an angle in degrees", _exact(math.tan, {0: 0.0, 45: 1.0, 135: -1.0}, 180.0),
-            lambda x: x % 180.0 != 90.0),
+    "SIN": (
+        "sine of an angle in degrees",
+        _exact(math.sin, {0: 0.0, 30: 0.5, 90: 1.0, 150: 0.5, 180: 0.0, 210: -0.5, 270: -1.0, 330: -0.5}, 360.0),
+        None,
+    ),
+    "COS": (
+        "cosine of an angle in degrees",
+        _exact(math.cos, {0: 1.0, 60: 0.5, 90: 0.0, 120: -0.5, 180: -1.0, 240: -0.5, 270: 0.0, 300: 0.5}, 360.0),
+        None,
+    ),
+    "TAN": (
+        "tangent of an angle in degrees",
+        _exact(math.tan, {0: 0.0, 45: 1.0, 135: -1.0}, 180.0),
+        lambda x: x % 180.0 != 90.0,
+    ),
     "ASIN": ("angle in degrees whose sine is given", lambda x: math.degrees(math.asin(x)), lambda x: abs(x) <= 1),
     "ACOS": ("angle in degrees whose cosine is given", lambda x: math.degrees(math.acos(x)), lambda x: abs(x) <= 1),
     "EXP": ("exponential", math.exp, lambda x: x < 709.78),
@@ -184,11 +241,16 @@ FUNCTIONS: dict[str, tuple[str, Callable[[float], float], Callable[[float], bool
 }
 
 
-def _function(name: str, summary: str, function: Callable[[float], float],
-              allowed: Callable[[float], bool] | None) -> Operator:
-    op = operator(name, topic="arithmetic", summary=summary,
-                  notice=f"{summary[0].upper()}{summary[1:]}, for a number, term by term for lists and fields.",
-                  example=f"MESS ({name} 0.5) ;")
+def _function(
+    name: str, summary: str, function: Callable[[float], float], allowed: Callable[[float], bool] | None
+) -> Operator:
+    op = operator(
+        name,
+        topic="arithmetic",
+        summary=summary,
+        notice=f"{summary[0].upper()}{summary[1:]}, for a number, term by term for lists and fields.",
+        example=f"MESS ({name} 0.5) ;",
+    )
 
     @op.form(Arg("x", FLOTTANT, "number"), gives=[FLOTTANT])
     def _apply(ctx: Context, x: float) -> float:
@@ -202,9 +264,13 @@ def _function(name: str, summary: str, function: Callable[[float], float],
 for _name, (_summary, _fn, _allowed) in FUNCTIONS.items():
     _function(_name, _summary, _fn, _allowed)
 
-ATG = operator("ATG", topic="arithmetic", summary="arc tangent in degrees",
-               notice="`ATG y x` is the angle of the direction (x, y), `ATG y` that of (1, y).",
-               example="MESS (ATG 1. 1.) ;")
+ATG = operator(
+    "ATG",
+    topic="arithmetic",
+    summary="arc tangent in degrees",
+    notice="`ATG y x` is the angle of the direction (x, y), `ATG y` that of (1, y).",
+    example="MESS (ATG 1. 1.) ;",
+)
 
 
 @ATG.form(Arg("y", FLOTTANT, "ordinate"), Arg("x", FLOTTANT, "abscissa", optional=True), gives=[FLOTTANT])
@@ -213,12 +279,19 @@ def _atg(ctx: Context, y: float, x: float | None) -> float:
 
 
 def _extreme(name: str, summary: str, choose: Callable[..., Any]) -> Operator:
-    op = operator(name, topic="arithmetic", summary=summary, example=f"MESS ({name[:4]} 3 7 5) ;", notice=(
-        "Of numbers, lists (their values) or fields (their values); with 'ABS' absolute values are compared. "
-        "'AVEC' and 'SANS' with a LISTMOTS keep or drop components of a field."))
+    op = operator(
+        name,
+        topic="arithmetic",
+        summary=summary,
+        example=f"MESS ({name[:4]} 3 7 5) ;",
+        notice=(
+            "Of numbers, lists (their values) or fields (their values); with 'ABS' absolute values are compared. "
+            "'AVEC' and 'SANS' with a LISTMOTS keep or drop components of a field."
+        ),
+    )
 
     @op.form(Arg("x", NUMBER, "numbers", many=True), Key("ABS", "compare absolute values"), gives=["ENTIER|FLOTTANT"])
-    def _of_numbers(ctx: Context, x: list[Any], abs: bool) -> Any:  # noqa: A002  (the keyword's name)
+    def _of_numbers(ctx: Context, x: list[Any], abs: bool) -> Any:
         values = [-v if abs and v < 0 else v for v in x]
         return choose(values) if all(type(v) is int for v in values) else float(choose(values))
 

@@ -15,12 +15,17 @@ MONTHS = {
     "en": "January February March April May June July August September October November December".split(),
 }
 
-TEMP = operator("TEMPS", topic="language", summary="time since the start, or since the last call",
-                notice="`TEMPS ;` prints the seconds since the session began and since the last call. `TEMPS 'ZERO'` "
-                       "starts the clock again. 'CPU' and 'HORL' give, as an ENTIER, the milliseconds of processor or of "
-                       "the clock on the wall since 'ZERO'. 'NOEC' gives both in a table, without printing: T.'TEMPS_CPU' "
-                       "and T.'TEMPS_HORLOGE', each with 'INITIAL' (since the start) and 'PRECEDENT' (since the last call).",
-                example="TEMPS 'ZERO' ; X = TEMPS 'HORL' ; MESS (X < 10000) ;", see=["DATE"])
+TEMP = operator(
+    "TEMPS",
+    topic="language",
+    summary="time since the start, or since the last call",
+    notice="`TEMPS ;` prints the seconds since the session began and since the last call. `TEMPS 'ZERO'` "
+    "starts the clock again. 'CPU' and 'HORL' give, as an ENTIER, the milliseconds of processor or of "
+    "the clock on the wall since 'ZERO'. 'NOEC' gives both in a table, without printing: T.'TEMPS_CPU' "
+    "and T.'TEMPS_HORLOGE', each with 'INITIAL' (since the start) and 'PRECEDENT' (since the last call).",
+    example="TEMPS 'ZERO' ; X = TEMPS 'HORL' ; MESS (X < 10000) ;",
+    see=["DATE"],
+)
 
 
 class _Clock:
@@ -66,8 +71,13 @@ def _silent(ctx: Context, noec: bool) -> Table:
     return found
 
 
-@TEMP.form(Key(("ZERO", "IMPR"), "start the clock again, or print it", name="what"), last=True)
-def _print(ctx: Context, what: str | None) -> None:
+@TEMP.form(
+    Key(("ZERO", "IMPR"), "start the clock again, or print it", name="what"),
+    Key(("MAXI", "SOMM"), "of Cast3M, which has several processes: nothing changes", name="over"),
+    Key(("CPU", "HORLOGE"), "of Cast3M: both times are printed", name="which"),
+    last=True,
+)
+def _print(ctx: Context, what: str | None, over: str | None, which: str | None) -> None:
     clock = _clock(ctx)
     now = clock.now()
     if what == "ZERO":
@@ -77,11 +87,16 @@ def _print(ctx: Context, what: str | None) -> None:
     clock.last = now
 
 
-DATE = operator("DATE", topic="language", summary="date and time of day, in a word or as numbers",
-                notice="`DATE` gives `dd/mm/yyyy - hh:mm:ss`; 'ANNEE', 'MOIS', 'JOUR', 'HEURE', 'MINUTE' or 'SECONDE' "
-                       "one of its numbers; 'LETTRE' the month as a word. 'EPOCH' gives seconds that grow from call to "
-                       "call; 'CONVERSION' writes seconds as days, hours, minutes and seconds.",
-                example="MESS (DATE 'CONVERSION' 123456.789) ;", see=["TEMPS"])
+DATE = operator(
+    "DATE",
+    topic="language",
+    summary="date and time of day, in a word or as numbers",
+    notice="`DATE` gives `dd/mm/yyyy - hh:mm:ss`; 'ANNEE', 'MOIS', 'JOUR', 'HEURE', 'MINUTE' or 'SECONDE' "
+    "one of its numbers; 'LETTRE' the month as a word. 'EPOCH' gives seconds that grow from call to "
+    "call; 'CONVERSION' writes seconds as days, hours, minutes and seconds.",
+    example="MESS (DATE 'CONVERSION' 123456.789) ;",
+    see=["TEMPS"],
+)
 PARTS = {"ANNEE": "year", "MOIS": "month", "JOUR": "day", "HEURE": "hour", "MINUTE": "minute", "SECONDE": "second"}
 LETTRE = Key("LETTRE", "month as a word")
 

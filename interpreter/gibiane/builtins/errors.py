@@ -10,12 +10,17 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ANY, ENTIER, MOT
 
-ERRE = operator("ERREUR", topic="errors", summary="raise an error, or estimate the error of a solution",
-                notice="Directive: `ERRE 0` does nothing, `ERRE n` raises error n with its text and level (5 is fatal: how "
-                       "tests fail; 'AVEC' adds values), `ERRE 'text'` writes the text and raises error 308. OPTI "
-                       "ERRE says what an error does. "
-                       "Operator: with a model, a stress field and a material, the error indicator.",
-                example="OPTI ERRE IGNO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;", see=["OPTION"])
+ERRE = operator(
+    "ERREUR",
+    topic="errors",
+    summary="raise an error, or estimate the error of a solution",
+    notice="Directive: `ERRE 0` does nothing, `ERRE n` raises error n with its text and level (5 is fatal: how "
+    "tests fail; 'AVEC' adds values), `ERRE 'text'` writes the text and raises error 308. OPTI "
+    "ERRE says what an error does. "
+    "Operator: with a model, a stress field and a material, the error indicator.",
+    example="OPTI ERRE IGNO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;",
+    see=["OPTION"],
+)
 
 
 @ERRE.form(Arg("n", ENTIER, "number of the error"), Key("AVEC", "values for its text", Arg("x", ANY, many=True)))

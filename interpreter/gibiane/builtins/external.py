@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-
 from gibiane.forms import Arg
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, FLOTTANT, MOT

@@ -10,15 +10,24 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, infix, operator
 from gibiane.values import ANNULE, ANY, ENTIER, FLOTTANT, LOGIQUE, MOT, TABLE, Table, Value, type_of
 
-ET = operator("ET", topic="logic", summary="join: logical and, concatenation of words, union of objects",
-              notice="LOGIQUE with LOGIQUE (two or more): true if all are. MOT with MOT: both joined, blanks at their "
-                     "ends removed unless 'TELQUEL'. Meshes, fields, models, matrices, lists: their union. Words must "
-                     "follow the operator: ET 'abc' 'def'.",
-              example="MESS (VRAI ET FAUX) (ET 'abc' 'def') ;", see=["OU", "NON"])
+ET = operator(
+    "ET",
+    topic="logic",
+    summary="join: logical and, concatenation of words, union of objects",
+    notice="LOGIQUE with LOGIQUE (two or more): true if all are. MOT with MOT: both joined, blanks at their "
+    "ends removed unless 'TELQUEL'. Meshes, fields, models, matrices, lists: their union. Words must "
+    "follow the operator: ET 'abc' 'def'.",
+    example="MESS (VRAI ET FAUX) (ET 'abc' 'def') ;",
+    see=["OU", "NON"],
+)
 
 
-@ET.form(Arg("a", LOGIQUE, "condition"), Arg("b", LOGIQUE, "condition"),
-         Arg("more", LOGIQUE, "conditions", many=True, optional=True), gives=[LOGIQUE])
+@ET.form(
+    Arg("a", LOGIQUE, "condition"),
+    Arg("b", LOGIQUE, "condition"),
+    Arg("more", LOGIQUE, "conditions", many=True, optional=True),
+    gives=[LOGIQUE],
+)
 def _and(ctx: Context, a: bool, b: bool, more: list[bool]) -> bool:
     return a and b and all(more)
 
@@ -31,18 +40,34 @@ def _join(ctx: Context, telquel: bool, a: str, b: str) -> str:
     return joined
 
 
-OU = operator("OU", topic="logic", summary="logical or", notice="True if one of two or more LOGIQUE is.",
-              example="MESS (VRAI OU FAUX) ;", see=["ET", "NON"])
+OU = operator(
+    "OU",
+    topic="logic",
+    summary="logical or",
+    notice="True if one of two or more LOGIQUE is.",
+    example="MESS (VRAI OU FAUX) ;",
+    see=["ET", "NON"],
+)
 
 
-@OU.form(Arg("a", LOGIQUE, "condition"), Arg("b", LOGIQUE, "condition"),
-         Arg("more", LOGIQUE, "conditions", many=True, optional=True), gives=[LOGIQUE])
+@OU.form(
+    Arg("a", LOGIQUE, "condition"),
+    Arg("b", LOGIQUE, "condition"),
+    Arg("more", LOGIQUE, "conditions", many=True, optional=True),
+    gives=[LOGIQUE],
+)
 def _or(ctx: Context, a: bool, b: bool, more: list[bool]) -> bool:
     return a or b or any(more)
 
 
-NON = operator("NON", topic="logic", summary="logical not", notice="The contrary of a LOGIQUE.",
-               example="MESS (NON VRAI) ;", see=["ET", "OU"])
+NON = operator(
+    "NON",
+    topic="logic",
+    summary="logical not",
+    notice="The contrary of a LOGIQUE.",
+    example="MESS (NON VRAI) ;",
+    see=["ET", "OU"],
+)
 
 
 @NON.form(Arg("a", LOGIQUE, "condition"), gives=[LOGIQUE])
@@ -50,14 +75,25 @@ def _not(ctx: Context, a: bool) -> bool:
     return not a
 
 
-EGA = infix("EGA", topic="logic", summary="are two values equal?", see=["NEG"],
-            example="MESS (3 EGA 3.7) (EGA 'AA' 'AA   ') ;",
-            notice="The second number takes the type of the first: 3 EGA 3.7 is VRAI. Words: trailing blanks do not "
-                   "count, case does; an ENTIER limits the letters compared. Two FLOTTANT may be followed by a "
-                   "tolerance. Other objects are equal when they are the same object. Values of different types differ. "
-                   "A word cannot stand before the operator: write EGA X 'WORD'.")
-NEG = infix("NEG", topic="logic", summary="are two values different?", see=["EGA"], example="MESS (3 NEG 4) ;",
-            notice="The contrary of EGA.")
+EGA = infix(
+    "EGA",
+    topic="logic",
+    summary="are two values equal?",
+    see=["NEG"],
+    example="MESS (3 EGA 3.7) (EGA 'AA' 'AA   ') ;",
+    notice="The second number takes the type of the first: 3 EGA 3.7 is VRAI. Words: trailing blanks do not "
+    "count, case does; an ENTIER limits the letters compared. Two FLOTTANT may be followed by a "
+    "tolerance. Other objects are equal when they are the same object. Values of different types differ. "
+    "A word cannot stand before the operator: write EGA X 'WORD'.",
+)
+NEG = infix(
+    "NEG",
+    topic="logic",
+    summary="are two values different?",
+    see=["EGA"],
+    example="MESS (3 NEG 4) ;",
+    notice="The contrary of EGA.",
+)
 
 
 def equal(a: Any, b: Any, tolerance: float | None = None) -> bool:
@@ -101,11 +137,16 @@ def _different(ctx: Context, q: Operands) -> bool:
     return not _two(ctx, q)
 
 
-TYPE = operator("TYPE", topic="values", summary="type of an object, as a word of 8 letters", terminal=True,
-                notice="The name of the type, padded with blanks to 8 letters. ENTIER, FLOTTANT, MOT, TABLE, POINT and others "
-                       "are names of operators too, which a word that stands first runs: write EGA (TYPE X) 'ENTIER', and "
-                       "let a procedure give the comparison, or the word in a TABLE, but not FINP (TYPE X).",
-                example="MESS (TYPE 2E5) ; MESS (EGA (TYPE 3) 'ENTIER') ;")
+TYPE = operator(
+    "TYPE",
+    topic="values",
+    summary="type of an object, as a word of 8 letters",
+    terminal=True,
+    notice="The name of the type, padded with blanks to 8 letters. ENTIER, FLOTTANT, MOT, TABLE, POINT and others "
+    "are names of operators too, which a word that stands first runs: write EGA (TYPE X) 'ENTIER', and "
+    "let a procedure give the comparison, or the word in a TABLE, but not FINP (TYPE X).",
+    example="MESS (TYPE 2E5) ; MESS (EGA (TYPE 3) 'ENTIER') ;",
+)
 
 
 @TYPE.form(Arg("x", ANY, "object"), gives=[MOT])
@@ -113,10 +154,15 @@ def _type(ctx: Context, x: Any) -> str:
     return type_of(x).ljust(8)
 
 
-EXIS = operator("EXISTE", topic="values", summary="does an object, a table index or a file exist?",
-                notice="`EXIS X`: X is not ANNULE (an undefined name is a word, and exists). `EXIS X*'TYPE'`: and has "
-                       "this type. `EXIS T index`: the table has the index. `EXIS F*'FICHIER'`: the file exists.",
-                example="T = TABL ; T.1 = 2 ; MESS (EXIS T 1) (EXIS T 2) (EXIS N*'ENTIER') ;", see=["TYPE"])
+EXIS = operator(
+    "EXISTE",
+    topic="values",
+    summary="does an object, a table index or a file exist?",
+    notice="`EXIS X`: X is not ANNULE (an undefined name is a word, and exists). `EXIS X*'TYPE'`: and has "
+    "this type. `EXIS T index`: the table has the index. `EXIS F*'FICHIER'`: the file exists.",
+    example="T = TABL ; T.1 = 2 ; MESS (EXIS T 1) (EXIS T 2) (EXIS N*'ENTIER') ;",
+    see=["TYPE"],
+)
 
 
 def _type_mark(q: Operands) -> str | None:

@@ -32,8 +32,9 @@ def _integer(low: int, high: int) -> Reader:
         value = int(q.need(ENTIER))
         if not low <= value <= high:
             ctx.places["value"] = node
-            ctx.fail(42, "{value} is out of bounds: {low} to {high} is accepted", at="value", value=value, low=low,
-                     high=high)
+            ctx.fail(
+                42, "{value} is out of bounds: {low} to {high} is accepted", at="value", value=value, low=low, high=high
+            )
         return value
 
     return read
@@ -76,6 +77,13 @@ def _anything(ctx: Context, q: Operands) -> Any:
     return value
 
 
+def _names(ctx: Context, q: Operands) -> Any:
+    """Read names of unknowns and, if they follow, of their duals."""
+    first = q.need("LISTMOTS", "names of unknowns")
+    second = q.read("LISTMOTS")
+    return first if second is None else (first, second)
+
+
 def _switch(ctx: Context, q: Operands) -> bool:
     return bool(q.need(LOGIQUE))
 
@@ -102,33 +110,96 @@ def _input(ctx: Context, q: Operands) -> Any:
         ctx.session.pending.append(name)
         return name
     if unit not in (KEYBOARD, FIRST_FILE):
-        ctx.fail(42, "{value} is out of bounds: {low} or {high} is accepted", at="value", value=unit, low=FIRST_FILE,
-                 high=KEYBOARD, hint="OPTI DONN 'name' ; reads a file")
+        ctx.fail(
+            42,
+            "{value} is out of bounds: {low} or {high} is accepted",
+            at="value",
+            value=unit,
+            low=FIRST_FILE,
+            high=KEYBOARD,
+            hint="OPTI DONN 'name' ; reads a file",
+        )
     ctx.session.pending.append(unit)
     return unit
 
 
 OPTIONS: dict[str, Reader] = {
-    "DIME": _integer(1, 3), "MODE": _mode, "ELEM": lambda ctx, q: _word(q), "DENS": _density,
-    "ECHO": _integer(-1, 2), "ERRE": _one_of("FATA", "NORM", "CONT", "IGNO"), "LANG": _language,
-    "SORT": _file, "SAUV": _file, "REST": _file, "ACQU": _acquired, "LECT": _file, "DONN": _input, "IMPR": _file,
-    "TRAC": _anything, "FTRA": _file, "EPTR": _anything, "ISOV": _anything, "COUL": _anything, "COSC": _anything,
-    "OEIL": _anything, "TITR": _anything, "RESO": _anything, "NORM": _anything, "PREC": _real, "PETI": _real,
-    "GRAN": _real, "ZERO": _real, "VERI": _anything, "IMPI": _anything, "DEBU": _anything, "LOCA": _switch,
-    "EPSI": _anything, "INCO": _anything,
+    "DIME": _integer(1, 3),
+    "MODE": _mode,
+    "ELEM": lambda ctx, q: _word(q),
+    "DENS": _density,
+    "ECHO": _integer(-1, 2),
+    "ERRE": _one_of("FATA", "NORM", "CONT", "IGNO"),
+    "LANG": _language,
+    "SORT": _file,
+    "SAUV": _file,
+    "REST": _file,
+    "ACQU": _acquired,
+    "LECT": _file,
+    "DONN": _input,
+    "IMPR": _file,
+    "TRAC": _anything,
+    "FTRA": _file,
+    "EPTR": _anything,
+    "ISOV": _anything,
+    "COUL": _anything,
+    "COSC": _anything,
+    "OEIL": _anything,
+    "TITR": _anything,
+    "RESO": _anything,
+    "NORM": _anything,
+    "PREC": _real,
+    "PETI": _real,
+    "GRAN": _real,
+    "ZERO": _real,
+    "VERI": _anything,
+    "IMPI": _anything,
+    "DEBU": _integer(0, 1),
+    "LOCA": _switch,
+    "EPSI": _anything,
+    "INCO": _names,
 }
 IGNORED = ("POTR", "POLI", "CADR", "SURV", "ATTE", "ASSI", "PARA", "PLAC", "NGMA", "NAVI", "LAGR", "ACCE", "OMEG")
 for _old in IGNORED:
     OPTIONS[_old] = _anything
 
-OPTI = operator("OPTION", topic="language", summary="set options of the session",
-                notice="Pairs of a word and its value: DIME 1, 2 or 3; ELEM type of elements; MODE PLAN CONT, PLAN DEFO, "
-                       "AXIS, TRID; DENS density; ECHO -1, 0, 1, 2; ERRE FATAL, NORMAL, CONTROLE or IGNORE; LANG FRAN "
-                       "or ANGL; SORT, SAUV, REST, FTRA, ACQU names of files. `VALE` reads them.",
-                example="OPTI DIME 3 ELEM CUB8 MODE TRID ;", see=["VALEUR"])
+DOCS: dict[str, str] = {
+    "DIME": "dimension of space: 1, 2 or 3",
+    "MODE": "PLAN CONT, PLAN DEFO, PLAN GENE, AXIS, TRID, FOUR n, UNID",
+    "ELEM": "type of the elements that mesh operators make",
+    "DENS": "density (size of elements) of the points made from now on",
+    "ECHO": "-1 errors only, 0 notes and warnings too, 1 instructions, 2 lines of procedures",
+    "ERRE": "FATAL, NORMAL, CONTROLE or IGNORE: what an error does",
+    "LANG": "FRAN or ANGL: language of listings and messages",
+    "SORT": "file that SORT writes",
+    "SAUV": "file that SAUV writes",
+    "REST": "file that REST reads",
+    "ACQU": "file that ACQU reads",
+    "DONN": "file to read now; 5 the keyboard, 3 back to the script",
+    "TRAC": "format of pictures",
+    "FTRA": "file of the pictures",
+    "COUL": "colour of what is made from now on",
+    "TITR": "title of pictures",
+    "RESO": "solver: DIRECTE or ITERATIVE",
+    "DEBU": "1: an error in a procedure shows its objects, and at the prompt stays in it until DEBU 0",
+    "LOCA": "VRAI: the objects of a procedure are kept in the table &NAME",
+}
+NO_EFFECT = "accepted, changes nothing"
+
+OPTI = operator(
+    "OPTION",
+    topic="language",
+    summary="set options of the session",
+    notice="Pairs of a word and its value, as many as wanted; `VALE` reads them. Options of Cast3M that have no meaning "
+    "here are accepted, and change nothing.",
+    example="OPTI DIME 3 ELEM CUB8 MODE TRID ;",
+    see=["VALEUR"],
+)
 
 
-@OPTI.stream(*(Key(word, "", Arg("value", ANY)) for word in OPTIONS), syntax="word value (word value)...")
+@OPTI.stream(
+    *(Key(word, DOCS.get(word, NO_EFFECT), Arg("value", ANY)) for word in OPTIONS), syntax="word value (word value)..."
+)
 def _opti(ctx: Context, q: Operands) -> None:
     if not q.values:
         ctx.fail(533, "an option is wanted", hint="OPTI DIME 3 ELEM CUB8 ;")
@@ -136,15 +207,26 @@ def _opti(ctx: Context, q: Operands) -> None:
         i = q.first_word()
         if i != 0:
             ctx.places["value"] = q.nodes[0]
-            ctx.fail(7, "the name of an option is wanted before this {type}", type=type_of(q.values[0]), at="value",
-                     hint="options come in pairs: OPTI DIME 3 ;")
+            ctx.fail(
+                7,
+                "the name of an option is wanted before this {type}",
+                type=type_of(q.values[0]),
+                at="value",
+                hint="options come in pairs: OPTI DIME 3 ;",
+            )
         word, node = q.values[0], q.nodes[0]
         name = str(word)[:4] if isinstance(word, str) else ""
         if name not in OPTIONS:
             close = nearest(str(word)[:8], sorted(OPTIONS))
             ctx.places["word"] = node
-            ctx.fail(7, "unknown option '{word}'", at="word", word=word, close=close,
-                     hint="did you mean '{close}'?" if close else "INFO OPTI ; lists the options")
+            ctx.fail(
+                7,
+                "unknown option '{word}'",
+                at="word",
+                word=word,
+                close=close,
+                hint="did you mean '{close}'?" if close else "INFO OPTI ; lists the options",
+            )
         del q.values[0], q.nodes[0]
         ctx.places["value"] = q.nodes[0] if q.nodes else node
         value = OPTIONS[name](ctx, q)
@@ -155,13 +237,23 @@ def _opti(ctx: Context, q: Operands) -> None:
         ctx.session.switch_input(ctx.session.pending.pop(0), ctx.operands.span(ctx.node))
 
 
-VALE = operator("VALEUR", topic="language", summary="value of an option", terminal=True,
-                notice="Reads an option: DIME, ELEM, MODE (PLANDEFO, PLANCONT, AXIS, TRID), DENS, ECHO, ERRE; PREC PETI "
-                       "GRAN are the precision, the smallest and the largest FLOTTANT. 'ERMA' is the highest error level so far.",
-                example="OPTI DIME 2 ; MESS (VALE DIME) ;", see=["OPTION"])
+VALE = operator(
+    "VALEUR",
+    topic="language",
+    summary="value of an option",
+    terminal=True,
+    notice="Reads an option: DIME, ELEM, MODE (PLANDEFO, PLANCONT, AXIS, TRID), DENS, ECHO, ERRE; PREC PETI "
+    "GRAN are the precision, the smallest and the largest FLOTTANT. 'ERMA' is the highest error level so far.",
+    example="OPTI DIME 2 ; MESS (VALE DIME) ;",
+    see=["OPTION"],
+)
 
 
-@VALE.stream(*(Key(word, "") for word in OPTIONS), Key("ERMA", "highest error level so far"), syntax="option:MOT")
+@VALE.stream(
+    *(Key(word, DOCS.get(word, NO_EFFECT)) for word in OPTIONS),
+    Key("ERMA", "highest error level so far"),
+    syntax="option:MOT",
+)
 def _vale(ctx: Context, q: Operands) -> Any:
     word = q.need_keyword([*OPTIONS, "ERMA"])
     if word == "ERMA":
@@ -174,9 +266,14 @@ def _vale(ctx: Context, q: Operands) -> Any:
     return value.replace(" ", "") if word == "MODE" else value
 
 
-TITR = operator("TITRE", topic="output", summary="title of the pictures that follow",
-                notice="Joins its operands as MESS does; TRAC and DESS write it over their pictures.",
-                example="TITRE 'two blocks, mu = ' 0.2 ;", see=["OPTION"])
+TITR = operator(
+    "TITRE",
+    topic="output",
+    summary="title of the pictures that follow",
+    notice="Joins its operands as MESS does; TRAC and DESS write it over their pictures.",
+    example="TITRE 'two blocks, mu = ' 0.2 ;",
+    see=["OPTION"],
+)
 
 
 @TITR.stream(syntax="x...")
@@ -186,8 +283,14 @@ def _titre(ctx: Context, q: Operands) -> None:
     ctx.session.options["TITR"] = compose(ctx, q).strip()
 
 
-INFO = operator("INFO", topic="language", summary="describe an operator", terminal=True,
-                notice="Prints the forms, operands, keywords and an example of an operator.", example="INFO MESS ;")
+INFO = operator(
+    "INFO",
+    topic="language",
+    summary="describe an operator",
+    terminal=True,
+    notice="Prints the forms, operands, keywords and an example of an operator.",
+    example="INFO MESS ;",
+)
 
 
 @INFO.stream(syntax="name")

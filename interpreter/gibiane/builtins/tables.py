@@ -10,10 +10,15 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, operator
 from gibiane.values import ANY, ENTIER, MOT, PREDEFINED, TABLE, Table, type_of
 
-TABL = operator("TABLE", topic="tables", summary="make a table",
-                notice="An empty table, with its subtype if given (entry 'SOUSTYPE'). `TABL T` gives the table T "
-                       "another name. Elements are read and written as T . index; an index is a value of any type.",
-                example="T = TABL ; T . 'A' = 3 ; MESS (T . 'A') ;", see=["DIME", "INDEX", "COPIER"])
+TABL = operator(
+    "TABLE",
+    topic="tables",
+    summary="make a table",
+    notice="An empty table, with its subtype if given (entry 'SOUSTYPE'). `TABL T` gives the table T "
+    "another name. Elements are read and written as T . index; an index is a value of any type.",
+    example="T = TABL ; T . 'A' = 3 ; MESS (T . 'A') ;",
+    see=["DIME", "INDEX", "COPIER"],
+)
 
 
 @TABL.form(Arg("t", TABLE, "table"), gives=[TABLE])
@@ -26,9 +31,14 @@ def _table(ctx: Context, subtype: str | None) -> Table:
     return Table(subtype)
 
 
-DIME = operator("DIMENSION", topic="values", summary="number of entries of a table or list, length of a word",
-                notice="TABLE: entries, SOUSTYPE included. LISTxxxx: values. MOT: characters.",
-                example="MESS (DIME 'abcd') ;", see=["TABLE"])
+DIME = operator(
+    "DIMENSION",
+    topic="values",
+    summary="number of entries of a table or list, length of a word",
+    notice="TABLE: entries, SOUSTYPE included. LISTxxxx: values. MOT: characters.",
+    example="MESS (DIME 'abcd') ;",
+    see=["TABLE"],
+)
 
 
 @DIME.form(Arg("t", TABLE, "table"), gives=[ENTIER])
@@ -41,10 +51,15 @@ def _dime_word(ctx: Context, word: str) -> int:
     return len(word)
 
 
-INDE = operator("INDEX", topic="tables", summary="indices of a table",
-                notice="A table of the indices, numbered from 1, in order of insertion. `INDE *'TYPE'` gives the objects "
-                       "of a type, by their names.",
-                example="T = TABL ; T . 'A' = 3 ; I = INDE T ; MESS (I . 1) ;", see=["TABLE"])
+INDE = operator(
+    "INDEX",
+    topic="tables",
+    summary="indices of a table",
+    notice="A table of the indices, numbered from 1, in order of insertion. `INDE *'TYPE'` gives the objects "
+    "of a type, by their names.",
+    example="T = TABL ; T . 'A' = 3 ; I = INDE T ; MESS (I . 1) ;",
+    see=["TABLE"],
+)
 
 
 @INDE.form(Arg("t", TABLE, "table"), gives=[TABLE])
@@ -68,9 +83,14 @@ def _named(ctx: Context, q: Operands) -> Any:
     return found
 
 
-OUBL = operator("OUBLIER", topic="values", summary="forget an entry of a table, or a name",
-                notice="`OUBL T index` removes the entry; `OUBL name` makes the name an ordinary word again.",
-                example="T = TABL ; T.1 = 5 ; OUBL T 1 ; MESS (DIME T) ;", see=["TABLE"])
+OUBL = operator(
+    "OUBLIER",
+    topic="values",
+    summary="forget an entry of a table, or a name",
+    notice="`OUBL T index` removes the entry; `OUBL name` makes the name an ordinary word again.",
+    example="T = TABL ; T.1 = 5 ; OUBL T 1 ; MESS (DIME T) ;",
+    see=["TABLE"],
+)
 
 
 @OUBL.form(Arg("t", TABLE, "table"), Arg("index", ANY, "index"))
@@ -88,15 +108,26 @@ def _forget_name(ctx: Context, q: Any) -> None:
         if node is not None:
             ctx.places["name"] = node
         close = nearest(name or "", list(ctx.session.names()))
-        ctx.fail(9, "no object {name} to forget here", name=name or "", at="name", close=close,
-                 hint="did you mean {close}?" if close else None)
+        ctx.fail(
+            9,
+            "no object {name} to forget here",
+            name=name or "",
+            at="name",
+            close=close,
+            hint="did you mean {close}?" if close else None,
+        )
     q.take((ANY,))
     del ctx.session.evaluator.frame.names[name]
 
 
-DETR = operator("DETRUIRE", topic="values", summary="do nothing: an object nobody names any more is freed by itself",
-                notice="`DETR x` reads the object, and the word 'ELEM' of Cast3M, and leaves the object as it is.",
-                example="L = 3 ; DETR L ; MESS L ;", see=["OUBLIER", "MENAGE"])
+DETR = operator(
+    "DETRUIRE",
+    topic="values",
+    summary="do nothing: an object nobody names any more is freed by itself",
+    notice="`DETR x` reads the object, and the word 'ELEM' of Cast3M, and leaves the object as it is.",
+    example="L = 3 ; DETR L ; MESS L ;",
+    see=["OUBLIER", "MENAGE"],
+)
 
 
 @DETR.form(Arg("x", ANY, "object"), Key("ELEM", "with its elements"))
@@ -104,8 +135,14 @@ def _destroy(ctx: Context, x: Any, elem: bool) -> None:
     return
 
 
-MENA = operator("MENAGE", topic="values", summary="do nothing: memory is freed by itself",
-                notice="Kept so that scripts of Cast3M run.", example="MENAGE ;", see=["DETRUIRE"])
+MENA = operator(
+    "MENAGE",
+    topic="values",
+    summary="do nothing: memory is freed by itself",
+    notice="Kept so that scripts of Cast3M run.",
+    example="MENAGE ;",
+    see=["DETRUIRE"],
+)
 
 
 @MENA.form(Key("OBLI", "at once"))
@@ -113,9 +150,14 @@ def _tidy(ctx: Context, obli: bool) -> None:
     return
 
 
-
-COPI = operator("COPIER", topic="values", summary="copy an object", notice="A TABLE is copied one level deep.",
-                example="T = TABL ; U = COPI T ; U.1 = 2 ; MESS (DIME T) ;", see=["TABLE"])
+COPI = operator(
+    "COPIER",
+    topic="values",
+    summary="copy an object",
+    notice="A TABLE is copied one level deep.",
+    example="T = TABL ; U = COPI T ; U.1 = 2 ; MESS (DIME T) ;",
+    see=["TABLE"],
+)
 
 
 @COPI.form(Arg("t", TABLE, "table"), gives=[TABLE])

@@ -28,15 +28,26 @@ def compose(ctx: Context, q: Operands) -> str:
         value, _ = q.take((ANY,))
         if value is ABSENT:
             break
-        if isinstance(value, str) and value[:6] == "FORMAT"[: max(4, len(value))] and value[:4] == "FORM" and (
-                q.values and isinstance(q.values[0], str)):
+        if (
+            isinstance(value, str)
+            and value[:6] == "FORMAT"[: max(4, len(value))]
+            and value[:4] == "FORM"
+            and (q.values and isinstance(q.values[0], str))
+        ):
             descriptor, place = q.values.pop(0), q.nodes.pop(0)
             try:
                 image = Format(descriptor)
             except BadFormat as failure:
                 ctx.places["format"] = place
-                ctx.fail(1094, "the format {format} is not understood", at="format", format=descriptor,
-                         label="here", hint=failure.template, **failure.fields)
+                ctx.fail(
+                    1094,
+                    "the format {format} is not understood",
+                    at="format",
+                    format=descriptor,
+                    label="here",
+                    hint=failure.template,
+                    **failure.fields,
+                )
             continue
         if value in MARKS and not (isinstance(node, Literal) and node.quoted) and text_ready(q):
             continue
@@ -44,12 +55,17 @@ def compose(ctx: Context, q: Operands) -> str:
             piece = _image(value, image)
         except BadFormat as failure:
             ctx.places["value"] = node
-            ctx.fail(1094, "this format does not suit a {type}", at="value", type=type_of(value),
-                     hint=failure.template, **failure.fields)
+            ctx.fail(
+                1094,
+                "this format does not suit a {type}",
+                at="value",
+                type=type_of(value),
+                hint=failure.template,
+                **failure.fields,
+            )
         if piece is None:
             ctx.places["value"] = node
-            ctx.fail(39, "a {type} has no text image", at="value", type=type_of(start),
-                     hint="LIST prints any object")
+            ctx.fail(39, "a {type} has no text image", at="value", type=type_of(start), hint="LIST prints any object")
         text = _placed(text, piece, q)
     return text
 
@@ -77,8 +93,12 @@ def _image(value: Any, image: Format) -> str | None:
 
 def _placed(text: str, piece: str, q: Operands) -> str:
     """Append a piece where the column mark that follows it says (`*N`, `/N`, `>N`, `<N`)."""
-    if len(q.values) < 2 or q.values[0] not in MARKS or type(q.values[1]) is not int or (
-            isinstance(q.nodes[0], Literal) and q.nodes[0].quoted):
+    if (
+        len(q.values) < 2
+        or q.values[0] not in MARKS
+        or type(q.values[1]) is not int
+        or (isinstance(q.nodes[0], Literal) and q.nodes[0].quoted)
+    ):
         return text + piece
     mark, column = q.values[0], q.values[1]
     del q.values[:2], q.nodes[:2]
@@ -96,11 +116,16 @@ def _placed(text: str, piece: str, q: Operands) -> str:
     return text[:start] + piece + text[start + len(piece) :]
 
 
-MESS = operator("MESSAGE", topic="output", summary="write a line",
-                notice="Writes the images of its operands, joined with nothing between them. A real has the format "
-                       "(1PE12.5), or the one that 'FORMAT' gives. After an item `*N` ends it at column N, `/N` starts "
-                       "it there; `<N` and `>N` count from the end of the text so far.",
-                example="MESS ' n=' 5 ' x=' 0.25 ;", see=["CHAINE", "LISTER"])
+MESS = operator(
+    "MESSAGE",
+    topic="output",
+    summary="write a line",
+    notice="Writes the images of its operands, joined with nothing between them. A real has the format "
+    "(1PE12.5), or the one that 'FORMAT' gives. After an item `*N` ends it at column N, `/N` starts "
+    "it there; `<N` and `>N` count from the end of the text so far.",
+    example="MESS ' n=' 5 ' x=' 0.25 ;",
+    see=["CHAINE", "LISTER"],
+)
 
 
 @MESS.stream(FORMAT_KEY, syntax="x... ('FORMAT' format:MOT)")
@@ -108,9 +133,15 @@ def _mess(ctx: Context, q: Operands) -> None:
     ctx.write(compose(ctx, q).rstrip() or " ")
 
 
-CHAI = operator("CHAINE", topic="values", summary="make a word of the images of several values", terminal=True,
-                notice="Joins images as MESS does, blanks kept. At most 512 characters.",
-                example="T = CHAI 'n=' 5 ; MESS T ;", see=["MESSAGE", "MOT"])
+CHAI = operator(
+    "CHAINE",
+    topic="values",
+    summary="make a word of the images of several values",
+    terminal=True,
+    notice="Joins images as MESS does, blanks kept. At most 512 characters.",
+    example="T = CHAI 'n=' 5 ; MESS T ;",
+    see=["MESSAGE", "MOT"],
+)
 
 
 @CHAI.stream(FORMAT_KEY, syntax="x... ('FORMAT' format:MOT)", gives=[MOT])
@@ -121,9 +152,15 @@ def _chai(ctx: Context, q: Operands) -> str:
     return text
 
 
-WORD = operator("MOT", topic="values", summary="a word that is not run as an operator", terminal=True,
-                notice="Keeps the word as a value, also when it is the name of an operator.",
-                example="OP = MOT 'PROG' ; MESS OP ;", see=["TEXTE"])
+WORD = operator(
+    "MOT",
+    topic="values",
+    summary="a word that is not run as an operator",
+    terminal=True,
+    notice="Keeps the word as a value, also when it is the name of an operator.",
+    example="OP = MOT 'PROG' ; MESS OP ;",
+    see=["TEXTE"],
+)
 
 
 @WORD.stream(syntax="word:MOT", gives=[MOT])
@@ -134,10 +171,16 @@ def _word(ctx: Context, q: Operands) -> str:
     return str(value)
 
 
-TEXT = operator("TEXTE", topic="values", summary="keep an instruction as text, run where it is read", terminal=True,
-                notice="The text of one elementary instruction, joined of words and numbers; naming the object puts its "
-                       "content there, and so runs it.",
-                example="T = TEXTE 'MESS 1' ; T ;", see=["MOT"])
+TEXT = operator(
+    "TEXTE",
+    topic="values",
+    summary="keep an instruction as text, run where it is read",
+    terminal=True,
+    notice="The text of one elementary instruction, joined of words and numbers; naming the object puts its "
+    "content there, and so runs it.",
+    example="T = TEXTE 'MESS 1' ; T ;",
+    see=["MOT"],
+)
 
 
 @TEXT.stream(syntax="x:MOT|ENTIER|FLOTTANT|TEXTE...", gives=[TEXTE])
@@ -166,21 +209,29 @@ def _text(ctx: Context, q: Operands) -> Texte:
     return Texte(text, instructions[0].items, instructions[0].source)
 
 
-LIST = operator("LISTER", topic="output", summary="print an object", terminal=True,
-                notice="Prints any object. 'RESU' abridges. An ENTIER after a list is the number of values a line. "
-                       "Without operand: every named object, by type; `LIST *'TYPE'` those of a type.",
-                example="LIST 5 ; LIST 3.14 ;", see=["MESSAGE"])
+LIST = operator(
+    "LISTER",
+    topic="output",
+    summary="print an object",
+    terminal=True,
+    notice="Prints any object. 'RESU' abridges. An ENTIER after a list is the number of values a line. "
+    "Without operand: every named object, by type; `LIST *'TYPE'` those of a type.",
+    example="LIST 5 ; LIST 3.14 ;",
+    see=["MESSAGE"],
+)
 
 
 def _scalar_listing(ctx: Context, value: Any) -> str:
     kind = type_of(value)
     if kind == ENTIER:
-        return ctx.session.listed(" Entier valant: {x}", x=value)
-    if kind == FLOTTANT:
-        return ctx.session.listed(" Reel valant: {x}", x=general(value).strip())
-    if kind == LOGIQUE:
-        return ctx.session.listed(" Logique valant: {x}", x="VRAI" if value else "FAUX")
-    return ctx.session.listed(" Chaine de {n} caracteres de contenu : {x}", n=len(value), x=value)
+        template, fields = " Entier valant: {x}", {"x": value}
+    elif kind == FLOTTANT:
+        template, fields = " Reel valant: {x}", {"x": general(value).strip()}
+    elif kind == LOGIQUE:
+        template, fields = " Logique valant: {x}", {"x": "VRAI" if value else "FAUX"}
+    else:
+        template, fields = " Chaine de {n} caracteres de contenu : {x}", {"n": len(value), "x": value}
+    return str(ctx.session.listed(template, **fields))
 
 
 @LIST.stream(Key("RESU", "abridged"), syntax="x (n:ENTIER) | 'RESU' x | (*'TYPE')")
@@ -212,9 +263,14 @@ def _list_names(ctx: Context, wanted: str | None) -> None:
             ctx.write(f" {kind:<8} : {' '.join(by_type[kind])}")
 
 
-SAUT = operator("SAUTER", topic="output", summary="write blank lines",
-                notice="`SAUT N 'LIGN'` writes N blank lines (one without N); `SAUT 'PAGE'` one.",
-                example="SAUT 2 'LIGN' ;", see=["MESSAGE"])
+SAUT = operator(
+    "SAUTER",
+    topic="output",
+    summary="write blank lines",
+    notice="`SAUT N 'LIGN'` writes N blank lines (one without N); `SAUT 'PAGE'` one.",
+    example="SAUT 2 'LIGN' ;",
+    see=["MESSAGE"],
+)
 
 
 @SAUT.form(Arg("n", ENTIER, "number of lines", optional=True), Key(("LIGNE", "PAGE"), "what to skip", name="what"))
@@ -223,9 +279,13 @@ def _saut(ctx: Context, n: int | None, what: str | None) -> None:
         ctx.write(" ")
 
 
-COMM = operator("COMMENTAIRE", topic="language", summary="a comment: its operands are discarded",
-                notice="Whatever follows is read and dropped. Parentheses are still evaluated.",
-                example="COMM 'nothing happens' ;")
+COMM = operator(
+    "COMMENTAIRE",
+    topic="language",
+    summary="a comment: its operands are discarded",
+    notice="Whatever follows is read and dropped. Parentheses are still evaluated.",
+    example="COMM 'nothing happens' ;",
+)
 
 
 @COMM.stream(syntax="anything")
@@ -234,11 +294,16 @@ def _comm(ctx: Context, q: Operands) -> None:
     q.nodes.clear()
 
 
-SORT = operator("SORTIR", topic="output", summary="write results to a file",
-                notice="`SORT 'CHAI' x...` writes one line to the file that OPTI 'SORT' names: words as they are, "
-                       "integers in 5 columns and 3 blanks, reals as 1PG12.5 between one and three blanks. 'VTK' "
-                       "writes meshes and fields for a viewer.",
-                example="OPTI 'SORT' 'resultats.txt' ; SORT 'CHAI' 'n' 4 0.5 ;", see=["OPTION"])
+SORT = operator(
+    "SORTIR",
+    topic="output",
+    summary="write results to a file",
+    notice="`SORT 'CHAI' x...` writes one line to the file that OPTI 'SORT' names: words as they are, "
+    "integers in 5 columns and 3 blanks, reals as 1PG12.5 between one and three blanks. 'VTK' "
+    "writes meshes and fields for a viewer.",
+    example="OPTI 'SORT' 'resultats.txt' ; SORT 'CHAI' 'n' 4 0.5 ;",
+    see=["OPTION"],
+)
 
 
 def output_path(ctx: Context, extension: str) -> Path:
@@ -258,13 +323,18 @@ def write_text(ctx: Context, path: Path, text: str) -> None:
         with path.open("a" if key in opened else "w", encoding="utf-8") as stream:
             stream.write(text)
     except OSError as failure:
-        ctx.fail(1130, "the file {path} cannot be written ({reason})", path=path.as_posix(),
-                 reason=(failure.strerror or "unknown reason").lower())
+        ctx.fail(
+            1130,
+            "the file {path} cannot be written ({reason})",
+            path=path.as_posix(),
+            reason=(failure.strerror or "unknown reason").lower(),
+        )
     opened.add(key)
 
 
-@SORT.form(Key("CHAINE", "a line of text", Arg("x", (MOT, ENTIER, FLOTTANT, LOGIQUE), "values", many=True),
-               required=True))
+@SORT.form(
+    Key("CHAINE", "a line of text", Arg("x", (MOT, ENTIER, FLOTTANT, LOGIQUE), "values", many=True), required=True)
+)
 def _sort_text(ctx: Context, chaine: list[Any]) -> None:
     pieces = []
     for value in chaine:

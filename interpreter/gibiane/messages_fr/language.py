@@ -164,7 +164,7 @@ LANGUAGE = {
     "division by zero": "division par zéro",
     "the result of {a} ** {b} is too large for a FLOTTANT": "le résultat de {a} ** {b} est trop grand pour un FLOTTANT",
     "{a} ** {b} is too large": "{a} ** {b} est trop grand",
-    "a real power of a number that is not positive ({a} ** {b})": "puissance réelle d'un nombre qui n'est pas positif ({a} ** {b})",
+    "a real power of a negative number ({a} ** {b})": "puissance réelle d'un nombre négatif ({a} ** {b})",
     "an ENTIER exponent is allowed: {a} ** {whole}": "un exposant ENTIER est permis : {a} ** {whole}",
     "ABS gives the absolute value": "ABS donne la valeur absolue",
     "zero to a negative power": "zéro à une puissance négative",
