@@ -46,7 +46,8 @@ RESO = operator(
     "iterations. 'HIST' U0: slip counts from the solution U0 of the load step before. 'DEPA' U1: start of the "
     "iterations. 'RAPP' T fills a table: CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION, "
     "CONE, PUISSANCE, EQUILIBRE, DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE, HISTOIRE, "
-    "MESSAGE. 'SOUC' turns a failure to converge into a warning and gives the best iterate.",
+    "MESSAGE. 'SOUC' turns a failure to converge into a warning and gives the best iterate; with 'RAPP' "
+    "the table says it (CONVERGE, MESSAGE) in place of the warning.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
     "CL = BLOQ 'DEPL' (S POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"

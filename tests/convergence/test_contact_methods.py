@@ -85,6 +85,13 @@ def test_penalty_errors(g):
     assert found.report.penetration > 0
 
 
+@pytest.mark.parametrize("g", [1e-2, 1.0, 1e2, 1e6])
+@pytest.mark.parametrize("scene", ["T1_1h", "T1_2h", "T4_2h"])
+def test_penalty_on_an_opening_contact_with_weak_friction(scene, g):
+    found = solve_penalty(blocks(scene).interface, 0.01, g)
+    assert found.report.balance < 1e-8
+
+
 def test_penalty_error_is_inverse_to_the_penalty():
     grid = 10.0 ** np.arange(2, 7)
     for column in range(3):

@@ -154,7 +154,8 @@ def _run(
             if wishes.report is not None:
                 _report(wishes.report, system, method, interface, state, converged, message)
             _fail(ctx, failure, message, method)
-        ctx.warn(1119, "contact has not converged: {reason}", reason=message, at="k")
+        if wishes.report is None:
+            ctx.warn(1119, "contact has not converged: {reason}", reason=message, at="k")
     if wishes.report is not None:
         _report(wishes.report, system, method, interface, state, converged, message)
     if wishes.compare and converged:

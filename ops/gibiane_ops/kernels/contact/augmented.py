@@ -9,9 +9,9 @@ import numpy as np
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import first_guess, newton_steps, robust_steps
+from gibiane_ops.kernels.contact.newton import first_guess, newton_steps
 from gibiane_ops.kernels.contact.outcome import finished, physical_state
-from gibiane_ops.kernels.contact.penalty import check_stiffness, sprung
+from gibiane_ops.kernels.contact.penalty import check_stiffness, penalty_steps, sprung
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState
 
@@ -139,7 +139,8 @@ def solve_uzawa(
     for _ in range(max_iter):
         inner: list[float] = []
         # the inner residual adds to the error of the multipliers: keep it well below
-        found = robust_steps(problem, now, min(1e-10, 0.01 * tolerance), 60, inner)
+        accuracy = min(1e-10, 0.01 * tolerance)
+        found = penalty_steps(interface, law, problem, now, accuracy, 60, inner, slip_origin)
         now = found.w, found.r
         history.append(float(np.abs(found.r - problem.multiplier).max(initial=0)))
         problem = replace(problem, multiplier=found.r)

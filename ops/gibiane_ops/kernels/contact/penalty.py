@@ -7,11 +7,11 @@ import numpy as np
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import first_guess, robust_steps
+from gibiane_ops.kernels.contact.newton import Iterate, first_guess, newton_steps, robust_steps, solve_coulomb
 from gibiane_ops.kernels.contact.outcome import finished, physical_state
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState
-from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.errors import BadValue, ContactUnbalanced, NotConverged
 
 
 def solve_penalty(
@@ -55,7 +55,8 @@ def solve_penalty(
     ``r = law(-g (w - gap n))``: normal force ``-g`` times the penetration, tangential force ``-g w_t`` cut at the
     bound. The error of displacements and forces is proportional to 1/g; the conditioning of the unreduced matrix
     ``K + g C^T C`` grows like g, which on the condensed interface costs nothing: 1e4 to 1e6 leave 4 to 6 digits. A g
-    below 1 gives a wrong answer with an excellent residual.
+    below 1 gives a wrong answer with an excellent residual. Where full steps fail, on opening contact with weak
+    friction, they start again from the exact solution.
 
     Source
     ------
@@ -70,9 +71,52 @@ def solve_penalty(
     check_stiffness(stiffness)
     problem = Problem.of(interface, law, stiffness, slip_origin, penalty=True)
     history: list[float] = []
-    found = robust_steps(problem, sprung(problem, start), tolerance, max_iter, history)
+    found = penalty_steps(interface, law, problem, sprung(problem, start), tolerance, max_iter, history, slip_origin)
     state = physical_state(interface, law, problem, found.w, found.r, found.status, history, slip_origin)
     return finished(interface, state, found.converged)
+
+
+def penalty_steps(
+    interface: Interface,
+    law: Friction,
+    problem: Problem,
+    first: tuple[FloatArray, FloatArray],
+    tolerance: float,
+    max_iter: int,
+    history: list[float],
+    slip_origin: FloatArray | None,
+) -> Iterate:
+    """Solve a penalised problem: full steps, then again from the exact solution, then damped steps.
+
+    Parameters
+    ----------
+    interface : Interface
+    law : Friction
+        In physical units.
+    problem : Problem
+        With ``penalty``.
+    first : tuple of (n, d) float64
+    tolerance : float
+    max_iter : int
+    history : list of float
+        Grows by one residual a step, those of the exact solution not counted.
+    slip_origin : (n, d - 1) float64 or None
+
+    Returns
+    -------
+    Iterate
+    """
+    found = newton_steps(problem, first, tolerance, max_iter, history)[0]
+    if found.converged:
+        return found
+    try:
+        exact = solve_coulomb(interface, law, slip_origin=slip_origin)
+    except (ContactUnbalanced, NotConverged):
+        return found
+    w, r = exact.w / problem.length, exact.r / problem.force
+    near = w + (problem.multiplier - r) / problem.gamma, r
+    found = found.better(newton_steps(problem, near, tolerance, max_iter, history)[0])
+    return found if found.converged else found.better(robust_steps(problem, first, tolerance, max_iter, history))
 
 
 def check_stiffness(r: float) -> None:
