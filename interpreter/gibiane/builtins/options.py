@@ -190,7 +190,7 @@ OPTI = operator(
     "OPTION",
     topic="language",
     summary="set options of the session",
-    notice="Pairs of a word and its value, as many as wanted; `VALE` reads them. Options of Cast3M that have no meaning "
+    notice="Pairs of a word and its value, as many as wanted; `VALE` reads them. Options of Cast3M without a meaning "
     "here are accepted, and change nothing.",
     example="OPTI DIME 3 ELEM CUB8 MODE TRID ;",
     see=["VALEUR"],
