@@ -1,0 +1,25 @@
+"""Smoothed stresses: from values at integration points to a continuous field at the nodes of one solid.
+
+Each function works on one solid at a time: a stress is never smoothed across two materials or across a contact.
+"""
+
+from gibiane_ops.kernels.recovery.averages import mean_of_centres, mean_of_nodes, nodal_mean, project
+from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock, centre_values, extrapolate
+from gibiane_ops.kernels.recovery.methods import METHODS, recover
+from gibiane_ops.kernels.recovery.patches import patch_recovery
+from gibiane_ops.kernels.recovery.samples import superconvergent_samples
+
+__all__ = [
+    "METHODS",
+    "Recovered",
+    "StressBlock",
+    "centre_values",
+    "extrapolate",
+    "mean_of_centres",
+    "mean_of_nodes",
+    "nodal_mean",
+    "patch_recovery",
+    "project",
+    "recover",
+    "superconvergent_samples",
+]

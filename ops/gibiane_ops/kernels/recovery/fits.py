@@ -1,0 +1,187 @@
+"""Least-squares polynomials of first or second degree through samples, one for each of many patches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+
+FLAT = 1e-8
+"""A patch whose samples spread less than this in one direction (ratio of variances) has no slope."""
+
+UNSEEN = 1e-3
+"""A curvature whose mean square over the samples is smaller than this, in units of their spread, is left out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places and values that belong to patches.
+
+    Attributes
+    ----------
+    patch : (k,) int64
+        Patch of each sample, increasing; every patch has some.
+    places : (k, dim) float64, length
+    values : (k, c) float64
+    """
+
+    patch: IntArray
+    places: FloatArray
+    values: FloatArray
+
+    @classmethod
+    def around(
+        cls, nodes: IntArray, star: tuple[IntArray, IntArray], sampled: Sequence[tuple[FloatArray, FloatArray]]
+    ) -> Samples:
+        """Gather the samples of the cells around each node of a list.
+
+        Parameters
+        ----------
+        nodes : (n,) int64
+        star : (indptr, cells)
+            Cells around each node, see `topology.node_to_cells`.
+        sampled : list of ((m, k, dim), (m, k, c)) float64
+            Places and values in the cells, block after block.
+
+        Returns
+        -------
+        Samples
+        """
+        indptr, cells = star
+        patch, entry = _ranges(indptr[nodes], indptr[nodes + 1] - indptr[nodes])
+        per_cell = np.concatenate([np.full(len(places), places.shape[1]) for places, _ in sampled])
+        start = np.cumsum(per_cell) - per_cell
+        cell = cells[entry]
+        row, sample = _ranges(start[cell], per_cell[cell])
+        places = np.concatenate([each.reshape(-1, each.shape[2]) for each, _ in sampled])
+        values = np.concatenate([each.reshape(-1, each.shape[2]) for _, each in sampled])
+        return cls(patch[row], places[sample], values[sample])
+
+
+def _ranges(start: IntArray, length: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the numbers start[i], start[i] + 1, ... of every range in one array, after the range of each."""
+    row = np.repeat(np.arange(len(start)), length)
+    first = np.cumsum(length) - length
+    return row, np.arange(len(row)) - first[row] + start[row]
+
+
+@dataclass(frozen=True, eq=False)
+class Fits:
+    """Polynomials ``value + d . slope + d . curvature . d`` with d the place less the centre.
+
+    Attributes
+    ----------
+    centre : (n, dim) float64, length
+    value : (n, c) float64
+    slope : (n, dim, c) float64
+    curvature : (n, dim, dim, c) float64
+    failed : (n,) bool
+        Too few samples for a slope: the polynomial is their mean.
+    flattened : (n,) bool
+        Some curvatures asked for are left out, because the samples do not determine them.
+    """
+
+    centre: FloatArray
+    value: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+    failed: NDArray[np.bool_]
+    flattened: NDArray[np.bool_]
+
+    def at(self, patch: IntArray, places: FloatArray) -> FloatArray:
+        """Evaluate polynomials at places, one for each; (k, c)."""
+        d = (places - self.centre[patch])[:, None]
+        result = self.value[patch] + np.matmul(d, self.slope[patch])[:, 0]
+        if self.curvature.any():
+            n, dim = d.shape[0], d.shape[2]
+            squares = (d.swapaxes(1, 2) * d).reshape(n, 1, dim * dim)
+            result += np.matmul(squares, self.curvature.reshape(len(self.centre), dim * dim, -1)[patch])[:, 0]
+        return np.asarray(result, np.float64)
+
+
+def fit(samples: Samples, degree: IntArray) -> Fits:
+    """Fit a polynomial to the samples of each patch.
+
+    Parameters
+    ----------
+    samples : Samples
+    degree : (n,) int64
+        1 or 2 for each patch.
+
+    Returns
+    -------
+    Fits
+
+    Notes
+    -----
+    Coordinates are scaled by the second moments of the samples, so that thin patches are like others. Curvatures are
+    fitted to what constant and linear terms leave, in the directions in which the samples determine them; the least
+    sum of squares is unique in the scaled coordinates. All functions up to the first degree are reproduced wherever
+    slopes exist.
+
+    Cost
+    ----
+    One batch for each number of samples in a patch.
+    """
+    n, dim, c = len(degree), samples.places.shape[1], samples.values.shape[1]
+    found = Fits(
+        np.zeros((n, dim)), np.zeros((n, c)), np.zeros((n, dim, c)), np.zeros((n, dim, dim, c)),
+        np.zeros(n, bool), np.zeros(n, bool),
+    )  # fmt: skip
+    length = np.bincount(samples.patch, minlength=n)
+    first = np.cumsum(length) - length
+    kinds, kind = np.unique(length * 3 + degree, return_inverse=True)
+    for number, key in enumerate(kinds):
+        patches = np.flatnonzero(kind == number)
+        rows = first[patches][:, None] + np.arange(key // 3)
+        _fit_alike(found, patches, samples.places[rows], samples.values[rows], int(key % 3))
+    return found
+
+
+def _fit_alike(found: Fits, patches: IntArray, places: FloatArray, values: FloatArray, degree: int) -> None:
+    """Fit the patches of a list, all of k samples: places (n, k, dim), values (n, k, c)."""
+    k = places.shape[1]
+    centre = places.mean(axis=1)
+    offset = places - centre[:, None]
+    spread, axes = np.linalg.eigh(np.matmul(offset.swapaxes(1, 2), offset) / k)
+    good = spread[:, 0] > FLAT * spread[:, -1]
+    found.centre[patches] = centre
+    found.value[patches] = values.mean(axis=1)
+    found.failed[patches] = ~good
+    patches, offset, values = patches[good], offset[good], values[good]
+    # In these coordinates the constant and linear terms are orthonormal over the samples.
+    scaling = axes[good] / np.sqrt(spread[good])[:, None, :]
+    y = np.matmul(offset, scaling)
+    slope = np.matmul(y.swapaxes(1, 2), values) / k
+    if degree == 2 and len(patches):
+        slope += _add_curvature(found, patches, scaling, y, values)
+    found.slope[patches] = np.matmul(scaling, slope)
+
+
+def _add_curvature(
+    found: Fits, patches: IntArray, scaling: FloatArray, y: FloatArray, values: FloatArray
+) -> FloatArray:
+    """Fit the quadratic terms to what the linear ones leave; return what this adds to the slopes in y."""
+    k, dim = y.shape[1:]
+    i, j = np.triu_indices(dim)
+    # The root of 2 makes the sum of the squares of the coefficients that of the curvature matrix: no axis is preferred.
+    root = np.where(i == j, 1.0, np.sqrt(2.0))
+    square = y[:, :, i] * y[:, :, j] * root
+    mean = square.mean(axis=1)
+    along = np.matmul(y.swapaxes(1, 2), square) / k
+    rest = square - mean[:, None] - np.matmul(y, along)
+    seen, modes = np.linalg.eigh(np.matmul(rest.swapaxes(1, 2), rest) / k)
+    kept = seen > UNSEEN
+    inverse = np.where(kept, 1.0 / np.where(kept, seen, 1.0), 0.0)
+    loads = np.matmul(modes.swapaxes(1, 2), np.matmul(rest.swapaxes(1, 2), values) / k)
+    coefficients = np.matmul(modes, inverse[:, :, None] * loads)
+    found.flattened[patches] = ~kept.all(axis=1)
+    found.value[patches] -= np.matmul(mean[:, None], coefficients)[:, 0]
+    matrix = np.zeros((len(patches), dim, dim, values.shape[2]))
+    matrix[:, i, j] = matrix[:, j, i] = coefficients / np.where(i == j, 1.0, np.sqrt(2.0))[:, None]
+    found.curvature[patches] = np.einsum("nai,nijc,nbj->nabc", scaling, matrix, scaling, optimize=True)
+    return np.asarray(-np.matmul(along, coefficients), np.float64)
