@@ -95,7 +95,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
         "gibiane_ops.masses",
     ),
     "/": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.vectors"),
-    "**": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic"),
+    "**": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "<": ("gibiane_ops.lists.mathematics",),
     ">": ("gibiane_ops.lists.mathematics",),
     "<EG": ("gibiane_ops.lists.mathematics",),
@@ -107,15 +107,19 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "TAN": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "ASIN": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "ACOS": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
-    "ATG": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic"),
+    "ATG": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "EXP": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "LOG": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "SINH": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "COSH": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "TANH": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
+    "ASIH": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
+    "ACOH": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
+    "ATAH": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "ERF": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
+    "ERFC": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "ABS": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
-    "SIGNE": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic"),
+    "SIGNE": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "ENTIER": ("gibiane_ops.lists.mathematics",),
     "FLOTTANT": ("gibiane_ops.lists.mathematics",),
     # models, matrices, loads, solution
@@ -158,6 +162,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "REDUIRE": ("gibiane_ops.fields.supports",),
     "INTG": ("gibiane_ops.fields.supports", "gibiane_ops.curves.ordinates"),
     "GRADIENT": ("gibiane_ops.fields.supports",),
+    "PROI": ("gibiane_ops.fields.transfer",),
     # smoothing, error, sizes
     "LISSER": ("gibiane_ops.smoothing",),
     "TAILLE": ("gibiane_ops.sizes",),
@@ -169,7 +174,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     # operators of the language with further forms
     "ET": ("gibiane_ops.lists.access", "gibiane_ops.lists.objects", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
     "EXISTE": ("gibiane_ops.fields.components", "gibiane_ops.lists.sorting"),
-    "ERREUR": ("gibiane_ops.error",),
+    "ERREUR": ("gibiane_ops.estimators", "gibiane_ops.error"),
 }
 
 

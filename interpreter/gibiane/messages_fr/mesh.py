@@ -125,6 +125,14 @@ MESH = {
     "the group {index} holds {shapes}: one of POI1, SEG2, TRI3, TET4 is wanted": "le groupe {index} contient {shapes} : il faut l'un de POI1, SEG2, TRI3, TET4",
     "the pair {index} has no MAILLAGE at index {side}": "le couple {index} n'a pas de MAILLAGE à l'indice {side}",
     "PAIRES is a {type}: a TABLE of TABLE is wanted": "PAIRES est un {type} : il faut une TABLE de TABLE",
+    # fields from one mesh to another
+    "the values of this field stand at {support}, those at nodes are wanted": "les valeurs de ce champ sont aux {support}, il les faut aux noeuds",
+    "not at nodes": "pas aux noeuds",
+    "CHAN 'NOEUD' MODL CH moves them there": "CHAN 'NOEUD' MODL CH les y met",
+    "this field has no value on a solid": "ce champ n'a pas de valeur sur un solide",
+    "a distance is positive: {value} cannot be one": "une distance est positive : {value} n'en est pas une",
+    "no element of the field holds {count} of the {total} points, the farthest at {distance}: they get the value of the nearest element": "aucun élément du champ ne contient {count} des {total} points, le plus loin à {distance} : ils prennent la valeur de l'élément le plus proche",
+    "a number after the field is the distance accepted, by parts of an element (1.E-5)": "un nombre après le champ est la distance admise, en parts d'élément (1.E-5)",
     # surfaces, volumes, transformations
     "this surface has no recorded side {number}": "cette surface ne garde pas de côté {number}",
     "give the line itself: CONT and ELEM 'COMP' extract it": "donner la ligne elle-même : CONT et ELEM 'COMP' l'extraient",

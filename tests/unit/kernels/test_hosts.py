@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gibiane_ops.kernels.elements.table import SHAPES, shape
-from gibiane_ops.kernels.mesh.hosts import hosted
+from gibiane_ops.kernels.mesh.hosts import find_hosts, hosted, interpolated
 
 
 @pytest.mark.parametrize("name", [n for n in SHAPES if shape(n).dim >= 1])
@@ -45,3 +45,34 @@ def test_no_points_and_no_elements():
     assert len(inside) == 0
     assert weights.shape == (0, 3)
     assert len(hosted(np.zeros((2, 2)), np.zeros((3, 2)), [])[0]) == 0
+
+
+@pytest.mark.parametrize("name", [n for n in SHAPES if shape(n).dim >= 1])
+def test_points_outside_get_the_nearest_place(name):
+    of = shape(name)
+    blocks = [(name, np.arange(of.n_nodes)[None])]
+    random = np.random.default_rng(1)
+    centre = of.ref_nodes[: of.n_corners].mean(axis=0)
+    points = centre + 8 * random.uniform(-1, 1, (200, of.dim))
+    hosts = find_hosts(points, of.ref_nodes, blocks, nearest=True)
+    assert (hosts.cell == 0).all()
+    image = interpolated(hosts, blocks, [of.ref_nodes[None]])
+    assert (hosted(image, of.ref_nodes, blocks, 1e-9)[0] == np.arange(200)).all()
+    lost = ~np.isfinite(hosts.out)
+    np.testing.assert_allclose(image[~lost], points[~lost], atol=1e-9)
+    # No corner of the element is nearer.
+    gap = np.linalg.norm(image - points, axis=1)
+    corner = np.linalg.norm(points[:, None] - of.ref_nodes[None, : of.n_corners], axis=2).min(axis=1)
+    assert (gap <= 1.45 * corner + 1e-12).all()
+
+
+def test_many_points_in_a_graded_mesh_are_all_found():
+    x = np.concatenate([[0.0], np.cumsum(1.5 ** np.arange(12))])
+    coords = np.stack(np.meshgrid(x, x, indexing="ij"), axis=-1).reshape(-1, 2)
+    ids = np.arange(169).reshape(13, 13)
+    quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
+    blocks = [("QUA4", quads[::2]), ("TRI3", np.concatenate([quads[1::2][:, :3], quads[1::2][:, [0, 2, 3]]]))]
+    points = np.random.default_rng(2).uniform(0, x[-1], (500, 2))
+    hosts = find_hosts(points, coords, blocks)
+    assert (hosts.cell >= 0).all()
+    np.testing.assert_allclose(interpolated(hosts, blocks, [coords[c] for _, c in blocks]), points, atol=1e-9)

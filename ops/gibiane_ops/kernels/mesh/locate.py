@@ -14,6 +14,8 @@ from gibiane_ops.kernels.topology import Block
 BoolArray = NDArray[np.bool_]
 # Steps of Newton's method for the reference coordinates; bilinear maps of sound elements need four or five.
 STEPS = 12
+# A jacobian below this share of the product of its columns is that of a flat element.
+FLAT = 1e-12
 
 
 def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray:
@@ -37,17 +39,45 @@ def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray
     kind = shape(name)
     centre = kind.ref_nodes[: kind.n_corners].mean(axis=0)
     xi = np.repeat(centre[None], len(X), axis=0)
-    for _ in range(STEPS):
-        gap = x - np.einsum("mn,mni->mi", kind.N(xi), X)
-        jacobian = np.einsum("mnd,mni->mid", kind.dN(xi), X)
-        gram = np.einsum("mid,mie->mde", jacobian, jacobian)
-        # A flat element has no inverse: the shift keeps it solvable, its points are found outside.
-        gram += 1e-14 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(kind.dim)
-        step = np.linalg.solve(gram, np.einsum("mid,mi->md", jacobian, gap)[..., None])[..., 0]
-        xi = np.clip(xi + step, centre - 10.0, centre + 10.0)
-        if np.abs(step).max(initial=0.0) < 1e-14:
+    affine = kind.degree == 1 and kind.n_nodes == kind.dim + 1
+    rows = np.arange(len(X))
+    for _ in range(1 if affine else STEPS):
+        own, XT = xi[rows], X[rows].transpose(0, 2, 1)
+        gap = x[rows] - np.matmul(XT, kind.N(own)[:, :, None])[..., 0]
+        step = _solved(np.matmul(XT, kind.dN(own)), gap)
+        moved = np.clip(own + step, centre - 10.0, centre + 10.0)
+        xi[rows] = moved
+        rows = rows[np.abs(moved - own).max(axis=1, initial=0.0) > 1e-13]
+        if not len(rows):
             break
     return np.asarray(xi, np.float64)
+
+
+def _solved(jacobian: FloatArray, gap: FloatArray) -> FloatArray:
+    """Solve small systems, (m, space_dim, dim) by (m, space_dim), in the sense of least squares.
+
+    A flat element has no inverse: the result is then very large or without meaning, and its points are found outside.
+    """
+    dim = jacobian.shape[2]
+    if jacobian.shape[1] != dim:
+        gap = np.matmul(jacobian.transpose(0, 2, 1), gap[..., None])[..., 0]
+        jacobian = np.matmul(jacobian.transpose(0, 2, 1), jacobian)
+    columns = [jacobian[:, :, j] for j in range(dim)]
+    if dim == 1:
+        adjugate = [np.ones_like(gap)]
+    elif dim == 2:
+        (a, c), (b, d) = columns[0].T, columns[1].T
+        adjugate = [np.stack([d, -b], axis=1), np.stack([-c, a], axis=1)]
+    else:
+        adjugate = [
+            np.cross(columns[1], columns[2]),
+            np.cross(columns[2], columns[0]),
+            np.cross(columns[0], columns[1]),
+        ]
+    det = (adjugate[0] * columns[0]).sum(axis=1)
+    least = FLAT * np.prod([np.linalg.norm(column, axis=1) for column in columns], axis=0)
+    det = np.where(np.abs(det) > least, det, np.where(least > 0, least, np.inf))
+    return np.stack([(row * gap).sum(axis=1) / det for row in adjugate], axis=1)
 
 
 def overshoot(name: str, xi: FloatArray) -> FloatArray:
