@@ -10,6 +10,7 @@ from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.recovery import StressBlock
+from gibiane_ops.kernels.supports import extension
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +54,10 @@ def solid_error(
 
     Notes
     -----
-    The rule is that of the stiffness (CUB8: 2x2x2); a simplex with one stress point takes its mass rule (TET4: four
-    points), because the smoothed field is linear there.
+    The rule is that of the stiffness for linear elements (CUB8: 2x2x2), but a simplex with one stress point takes its
+    mass rule (TET4: four points), because the smoothed field is linear there. In elements of second degree the
+    smoothed field is quadratic and its square of degree 4: all take their mass rule, to which their stresses are
+    extended (`supports.extension`).
 
     Source
     ------
@@ -62,7 +65,10 @@ def solid_error(
     """
     xi, density = _integration(block.shape, points[block.cells], axisymmetric)
     smooth = np.matmul(block.shape.N(xi), nodal[block.cells])
-    raw = np.broadcast_to(block.stress, smooth.shape)
+    raw = block.stress
+    if block.shape.degree > 1:
+        raw = np.asarray(np.matmul(extension(block.shape, block.shape.gauss[0], xi), raw), np.float64)
+    raw = np.broadcast_to(raw, smooth.shape)
     return SolidError(
         _energy(smooth - raw, density, compliance),
         _energy(raw, density, compliance),
@@ -72,7 +78,8 @@ def solid_error(
 
 def _integration(shape: Shape, X: FloatArray, axisymmetric: bool) -> tuple[FloatArray, FloatArray]:
     """Return the points of the rule, (q, dim), and the measures that they carry, (m, q)."""
-    rule = shape.stiffness_rule if len(shape.stiffness_rule.weights) > 1 else shape.mass_rule
+    own = shape.degree == 1 and len(shape.stiffness_rule.weights) > 1
+    rule = shape.stiffness_rule if own else shape.mass_rule
     density = geometry.measure_densities(shape, X, rule.points) * rule.weights
     if axisymmetric:
         density = density * geometry.circumferences(shape, X, rule.points)
