@@ -237,7 +237,11 @@ FUNCTIONS: dict[str, tuple[str, Callable[[float], float], Callable[[float], bool
     "SINH": ("hyperbolic sine", math.sinh, lambda x: abs(x) < 710),
     "COSH": ("hyperbolic cosine", math.cosh, lambda x: abs(x) < 710),
     "TANH": ("hyperbolic tangent", math.tanh, None),
+    "ASIH": ("inverse of the hyperbolic sine", math.asinh, None),
+    "ACOH": ("inverse of the hyperbolic cosine", math.acosh, lambda x: x >= 1),
+    "ATAH": ("inverse of the hyperbolic tangent", math.atanh, lambda x: abs(x) < 1),
     "ERF": ("error function", math.erf, None),
+    "ERFC": ("complementary error function", math.erfc, None),
 }
 
 

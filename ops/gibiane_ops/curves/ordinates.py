@@ -13,10 +13,12 @@ from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, extend
 from gibiane.values import ENTIER, EVOLUTIO, FLOTTANT, LISTENTI, LISTREEL
-from gibiane_ops.curves.reading import CURVES, kept, numeric
+from gibiane_ops.curves.reading import CURVES, kept, numeric, ordinates
+from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.functions import FUNCTIONS
 from gibiane_ops.kernels.interpolation import integral
+from gibiane_ops.kernels.powers import real_power, undefined
 from gibiane_ops.values.evolution import Curve, Evolution
 from gibiane_ops.values.listes import ListEnti, ListReel
 
@@ -24,7 +26,7 @@ NUMBERS = (ENTIER, FLOTTANT)
 
 
 def _with_ordinates(ctx: Context, curves: Evolution, function: Callable[[Any], NDArray[Any]]) -> Evolution:
-    return Evolution([replace(c, y=ListReel(function(y))) for c, _, y in numeric(ctx, curves)])
+    return Evolution([replace(c, y=ListReel(function(y))) for c, y in ordinates(ctx, curves)])
 
 
 UFUNCS: dict[str, Callable[[Any, Any], Any]] = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
@@ -48,9 +50,27 @@ def _arithmetic(symbol: str) -> None:
         if isinstance(a, Evolution):
             check(ctx, b, "b")
             return _with_ordinates(ctx, a, lambda y: np.asarray(compute(y, b)))
-        for _, _, y in numeric(ctx, b, "b"):
+        for _, y in ordinates(ctx, b, "b"):
             check(ctx, y, "b")
         return _with_ordinates(ctx, b, lambda y: np.asarray(compute(a, y)))
+
+
+def _powers(ctx: Context, base: Any, exponent: Any) -> FloatArray:
+    if undefined(base, exponent).any():
+        ctx.fail(213, "a real power of a negative ordinate", at="a")
+    if np.any((np.asarray(base) == 0) & (np.asarray(exponent) < 0)):
+        ctx.fail(26, "zero to a negative power", at="a")
+    return real_power(base, exponent)
+
+
+@extend("**").form(Arg("a", EVOLUTIO, "curves"), Arg("b", NUMBERS, "exponent"), gives=[EVOLUTIO])
+def _power(ctx: Context, a: Evolution, b: float) -> Evolution:
+    return _with_ordinates(ctx, a, lambda y: _powers(ctx, y, b))
+
+
+@extend("**").form(Arg("a", NUMBERS, "number"), Arg("b", EVOLUTIO, "exponents"), gives=[EVOLUTIO])
+def _power_of_number(ctx: Context, a: float, b: Evolution) -> Evolution:
+    return _with_ordinates(ctx, b, lambda y: _powers(ctx, a, y))
 
 
 def _of_two(
@@ -83,7 +103,7 @@ for _symbol in UFUNCS:
 def _function(name: str, function: Callable[[Any], Any], allowed: Callable[[Any], Any] | None) -> None:
     @extend(name).form(CURVES, gives=[EVOLUTIO])
     def _apply(ctx: Context, curves: Evolution) -> Evolution:
-        for _, _, y in numeric(ctx, curves):
+        for _, y in ordinates(ctx, curves):
             if allowed is not None and not np.all(allowed(y)):
                 worst = float(y[int(np.flatnonzero(~allowed(y))[0])])
                 ctx.fail(26, "{x} is outside the range of {name}", at="curves", x=worst, name=name)
@@ -93,6 +113,8 @@ def _function(name: str, function: Callable[[Any], Any], allowed: Callable[[Any]
 for _name, (_fn, _allowed) in FUNCTIONS.items():
     _function(_name, _fn, _allowed)
 _function("ABS", np.abs, None)
+_function("SIGN", np.sign, None)
+_function("ATG", lambda y: np.degrees(np.arctan(y)), None)
 
 
 @extend("ET").form(Arg("a", EVOLUTIO, "curves"), Arg("b", EVOLUTIO, "curves"), gives=[EVOLUTIO])

@@ -38,6 +38,14 @@ def numeric(ctx: Context, curves: Evolution, at: str = "curves") -> Iterator[tup
         yield curve, curve.x.values.astype(np.float64), curve.y.values.astype(np.float64)
 
 
+def ordinates(ctx: Context, curves: Evolution, at: str = "curves") -> Iterator[tuple[Curve, FloatArray]]:
+    """Yield each curve with its ordinates; its abscissae may be words."""
+    for number, curve in enumerate(curves.curves, 1):
+        if isinstance(curve.y, ListMots):
+            ctx.fail(21, "curve {number} is not made of numbers", at=at, number=number)
+        yield curve, curve.y.values.astype(np.float64)
+
+
 def component(ctx: Context, field: ChPoint | MChaml, name: str | None) -> str:
     """Return the name of a component that a field has: the one given, or the only one."""
     if name is not None and name.strip() in field.names:

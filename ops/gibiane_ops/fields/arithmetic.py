@@ -10,6 +10,8 @@ import numpy as np
 from gibiane.forms import Arg
 from gibiane.registry import Context, Operator, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTMOTS, MCHAML
+from gibiane_ops.kernels import functions
+from gibiane_ops.kernels.powers import real_power, undefined
 from gibiane_ops.values.algebra import Field, Incompatible, added, by_names, combined, joined, mapped, values_of
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.material import refused
@@ -103,10 +105,28 @@ def _power(ctx: Context, a: Field, b: Number) -> Field:
     values = values_of(a)
     if b < 0:
         _refuse_zeros(ctx, a, "a")
-    negative = int((values < 0).sum())
-    if isinstance(b, float) and negative:
-        ctx.fail(213, "a real power of {count} negative values", at="a", count=negative)
-    return mapped(a, lambda v: np.asarray(v ** float(b), np.float64))
+    negative = int(undefined(values, float(b)).sum())
+    if negative:
+        ctx.fail(
+            213,
+            "a real power of {count} negative values",
+            at="a",
+            count=negative,
+            hint="whole powers and odd roots of it exist: ** 2, ** (1./3.)",
+        )
+    return mapped(a, lambda v: real_power(v, float(b)))
+
+
+@extend("**").form(
+    Arg("a", (ENTIER, FLOTTANT), "number"), Arg("b", (CHPOINT, MCHAML), "exponents"), gives=["CHPOINT|MCHAML"]
+)
+def _power_of_number(ctx: Context, a: Number, b: Field) -> Field:
+    exponents = values_of(b)
+    if undefined(a, exponents).any():
+        ctx.fail(213, "a real power of a negative number ({a})", at="a", a=a)
+    if a == 0 and (exponents < 0).any():
+        ctx.fail(26, "zero to a negative power", at="a")
+    return mapped(b, lambda v: real_power(float(a), v))
 
 
 UNION = extend("ET")
@@ -141,27 +161,11 @@ def _union_of_elements(ctx: Context, a: MChaml, b: MChaml, more: list[MChaml]) -
     return total
 
 
-def _erf(v: FloatArray) -> FloatArray:
-    from scipy.special import erf
-
-    return np.asarray(erf(v), np.float64)
-
-
 FUNCTIONS: dict[str, tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], Any] | None]] = {
     "ABS": (np.abs, None),
     "SIGNE": (np.sign, None),
-    "SIN": (lambda v: np.sin(np.radians(v)), None),
-    "COS": (lambda v: np.cos(np.radians(v)), None),
-    "TAN": (lambda v: np.tan(np.radians(v)), lambda v: v % 180.0 != 90.0),
-    "ASIN": (lambda v: np.degrees(np.arcsin(v)), lambda v: np.abs(v) <= 1),
-    "ACOS": (lambda v: np.degrees(np.arccos(v)), lambda v: np.abs(v) <= 1),
     "ATG": (lambda v: np.degrees(np.arctan(v)), None),
-    "EXP": (np.exp, lambda v: v < 709.78),
-    "LOG": (np.log, lambda v: v > 0),
-    "SINH": (np.sinh, lambda v: np.abs(v) < 710),
-    "COSH": (np.cosh, lambda v: np.abs(v) < 710),
-    "TANH": (np.tanh, None),
-    "ERF": (_erf, None),
+    **functions.FUNCTIONS,
 }
 
 

@@ -17,6 +17,12 @@ def _erf(x: Array) -> Array:
     return np.asarray(erf(x))
 
 
+def _erfc(x: Array) -> Array:
+    from scipy.special import erfc
+
+    return np.asarray(erfc(x))
+
+
 def _degrees(function: Callable[[Array], Array], exact: Mapping[int, float], period: float) -> Callable[[Array], Array]:
     """Return a function of angles in degrees that is exact at the angles listed."""
 
@@ -44,5 +50,9 @@ FUNCTIONS: dict[str, tuple[Callable[[Array], Array], Callable[[Array], Array] | 
     "SINH": (np.sinh, lambda x: np.abs(x) < 710),
     "COSH": (np.cosh, lambda x: np.abs(x) < 710),
     "TANH": (np.tanh, None),
+    "ASIH": (np.arcsinh, None),
+    "ACOH": (np.arccosh, lambda x: x >= 1),
+    "ATAH": (np.arctanh, lambda x: np.abs(x) < 1),
     "ERF": (_erf, None),
+    "ERFC": (_erfc, None),
 }

@@ -12,6 +12,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
 from gibiane.values import ENTIER, FLOTTANT, LISTENTI, LISTREEL, LOGIQUE
 from gibiane_ops.kernels.functions import FUNCTIONS
+from gibiane_ops.kernels.powers import real_power, undefined
 from gibiane_ops.values.listes import ListEnti, ListReel
 
 Numbers = ListReel | ListEnti
@@ -67,20 +68,20 @@ def _quotient(ctx: Context, a: Any, b: Any) -> Array:
 
 def _power(ctx: Context, a: Any, b: Any) -> Array:
     base, exponent = np.broadcast_arrays(np.asarray(a), np.asarray(b))
-    if exponent.dtype.kind == "f" and np.any(base <= 0):
-        number = int(np.flatnonzero(base <= 0)[0]) + 1
+    wrong = np.flatnonzero(undefined(base, exponent))
+    if len(wrong):
         ctx.fail(
             213,
-            "a real power of a number that is not positive (value {number})",
+            "a real power of a negative number (value {number})",
             at="a",
-            number=number,
-            hint="an ENTIER exponent is allowed",
+            number=int(wrong[0]) + 1,
+            hint="whole powers and odd roots of it exist: ** 2, ** (1./3.)",
         )
     if np.any((base == 0) & (exponent < 0)):
         ctx.fail(26, "zero to a negative power", at="a")
     if base.dtype.kind == "i" and exponent.dtype.kind == "i" and np.all(exponent >= 0):
         return np.asarray(base**exponent)
-    return np.asarray(base.astype(np.float64) ** exponent)
+    return real_power(base, exponent)
 
 
 _arithmetic("+", lambda _ctx, a, b: np.asarray(a + b))
