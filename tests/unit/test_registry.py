@@ -1,6 +1,7 @@
 """Every declared operator is documented, its example runs, and the table of families agrees with the declarations."""
 
 import io
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from gibiane.registry import Operator
 
 Session(out=io.StringIO())
 EVERY = operators()
+ROOT = Path(__file__).parents[2]
 BY_NAME = pytest.mark.parametrize("op", EVERY, ids=lambda op: op.name)
 
 
@@ -58,3 +60,16 @@ def test_table_of_families_agrees_with_the_declarations() -> None:
         homes_of_forms = {form.function.__module__ for form in op.forms}
         assert set(homes) <= homes_of_forms, name
         assert {m for m in homes_of_forms if m.startswith("gibiane_ops")} <= set(homes), name
+
+
+def keywords() -> list[tuple[str, str]]:
+    return sorted({(op.name, word) for op in EVERY for form in op.forms for key in form.keys for word in key.words})
+
+
+def test_every_keyword_appears_in_a_script() -> None:
+    """In a golden script, an example or a procedure: by its first four letters."""
+    scripts = [*ROOT.glob("tests/golden/**/*.dgibi"), *ROOT.glob("examples/**/*.dgibi"), *ROOT.glob("scripts/**/*.procedur")]
+    text = "\n".join([*(p.read_text(encoding="utf-8", errors="replace") for p in scripts), *(op.example for op in EVERY)])
+    used = {word[:4] for word in re.findall(r"[A-Z][A-Z0-9_]*", text.upper())}
+    missing = [f"{name} '{word}'" for name, word in keywords() if word[:4] not in used]
+    assert not missing, f"{len(missing)} keywords that nothing tries: {', '.join(missing)}"
