@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
 from gibiane_ops.kernels import geometry
-from gibiane_ops.kernels.arrays import N_COMPONENTS, FloatArray, IntArray, component_of, strain_vector, stress_tensor
+from gibiane_ops.kernels.arrays import N_COMPONENTS, FloatArray, IntArray, component_of, stress_tensor
 from gibiane_ops.kernels.elements.shape import Shape
 
 # Elements treated together: large enough to hide the interpreter, small enough to stay in the caches.
@@ -247,14 +247,21 @@ def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisy
         Engineering shears. In a plane eps_zz is 0; for plane stress take it from `materials.compliance`. In a body of
         revolution it is the hoop strain ``u_r / r``.
     """
-    gradient, _ = geometry.gradients(shape, X, xi)
     dim = X.shape[2]
-    H = np.zeros((*gradient.shape[:2], 3, 3))
-    H[..., :dim, :dim] = np.matmul(U.transpose(0, 2, 1)[:, None], gradient)
+    found = np.empty((len(X), len(xi), N_COMPONENTS[dim]))
+    for start in range(0, len(X), CHUNK):
+        part = slice(start, start + CHUNK)
+        H = geometry.vector_gradients(shape, X[part], U[part], xi)
+        if dim == 2:
+            found[part, :, component_of(2, 2)] = 0.0
+        for i in range(dim):
+            found[part, :, component_of(i, i)] = H[..., i, i]
+            for j in range(i + 1, dim):
+                found[part, :, component_of(i, j)] = H[..., i, j] + H[..., j, i]
     if axisymmetric:
         N = shape.N(xi)
-        H[..., 2, 2] = (U[:, :, 0] @ N.T) / (X[:, :, 0] @ N.T)
-    return strain_vector((H + H.swapaxes(-1, -2)) / 2, N_COMPONENTS[dim])
+        found[:, :, component_of(2, 2)] = (U[:, :, 0] @ N.T) / (X[:, :, 0] @ N.T)
+    return found
 
 
 def stresses(strain: FloatArray, D: FloatArray) -> FloatArray:

@@ -55,7 +55,7 @@ def _determinants(J: FloatArray) -> FloatArray:
 def _inverses(J: FloatArray, det: FloatArray) -> FloatArray:
     """Return the inverses by cofactors; `numpy.linalg.inv` is several times slower on millions of 3x3 matrices."""
     dim = J.shape[-1]
-    inverse = np.empty(J.shape)
+    inverse = np.empty_like(J)
     if dim == 1:
         inverse[...] = 1.0
     elif dim == 2:
@@ -171,6 +171,39 @@ def gradients(shape: Shape, X: FloatArray, xi: FloatArray) -> tuple[FloatArray, 
     J = jacobians(shape, X, xi)
     det = _determinants(J)
     return np.matmul(shape.dN(xi), _inverses(J, det)), det
+
+
+def vector_gradients(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray) -> FloatArray:
+    """Compute the derivatives of a vector by the coordinates.
+
+    Parameters
+    ----------
+    shape : Shape
+        A shape that fills the space: ``dim == space_dim``.
+    X : (m, n_nodes, dim) float64, length
+    U : (m, n_nodes, d) float64
+        Nodal values.
+    xi : (q, dim) float64
+
+    Returns
+    -------
+    (m, q, d, dim) float64
+        ``d u_i / d x_j``. Each component lies contiguous in memory, which is what sums of components want.
+    """
+    J, G = (_by_component(jacobians(shape, values, xi)) for values in (X, U))
+    inverse = _inverses(J, _determinants(J))
+    found = np.empty((G.shape[2], J.shape[2], *J.shape[:2])).transpose(2, 3, 0, 1)
+    for i in range(found.shape[2]):
+        for j in range(found.shape[3]):
+            found[..., i, j] = G[..., i, 0] * inverse[..., 0, j]
+            for k in range(1, shape.dim):
+                found[..., i, j] += G[..., i, k] * inverse[..., k, j]
+    return found
+
+
+def _by_component(tensors: FloatArray) -> FloatArray:
+    """Return the same array, (..., i, j), with each component contiguous in memory."""
+    return np.ascontiguousarray(tensors.transpose(2, 3, 0, 1)).transpose(2, 3, 0, 1)
 
 
 def measures(shape: Shape, X: FloatArray) -> FloatArray:
