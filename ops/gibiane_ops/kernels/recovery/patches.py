@@ -36,8 +36,10 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     superconvergent points of its elements: linear for linear elements, with all 6 or 10 quadratic terms for elements
     of second degree (linear where the two kinds meet). A corner of the surface takes the mean of the polynomials of
     the inner corners that share an element with it, or those of the next ring of corners, and so on: a patch of its
-    own would be one-sided and often of deficient rank. Only in a piece without any inner corner does a corner of the
-    surface use its own elements. A mid-node takes the mean of what the two ends of its edge use.
+    own would be one-sided and often of deficient rank. With elements of second degree they share an edge with it,
+    which in bricks leaves the nearest: a parabola goes wrong faster away from its patch. Only in a piece without any
+    inner corner does a corner of the surface use its own elements. A mid-node takes the mean of what the two ends of
+    its edge use.
 
     Source
     ------
@@ -58,7 +60,9 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     star = topology.node_to_cells(mesh, n_points)
     fits = fit(Samples.around(own, star, sampled), highest[own])
 
-    weights = _lending(mesh, n_points, used, inner, own)
+    straight = all(block.shape.degree == 1 for block in blocks)
+    graph = topology.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
+    weights = _lending(graph.astype(bool), used, inner, own)
     shares = (weights + _middles(blocks, used, n_points) @ weights).tocoo()
     node, patch = shares.coords
     fitted = shares.data[:, None] * fits.at(patch, points[node])
@@ -77,15 +81,22 @@ def _patch_nodes(mesh: Sequence[Block], used: IntArray, n_points: int) -> tuple[
     return inner, np.concatenate([inner, used[~has_inner[piece[used]]]])
 
 
-def _lending(mesh: Sequence[Block], n_points: int, used: IntArray, inner: IntArray, own: IntArray) -> sp.csr_array:
+def _edge_graph(mesh: Sequence[Block], n_points: int) -> sp.csr_array:
+    """Return the graph of the corners joined by an edge, each joined to itself too."""
+    first, second = topology.edges(mesh).T
+    links = sp.csr_array((np.ones(len(first), np.int32), (first, second)), shape=(n_points, n_points))
+    return sp.csr_array(links + links.T + sp.eye_array(n_points, dtype=np.int32))
+
+
+def _lending(graph: sp.csr_array, used: IntArray, inner: IntArray, own: IntArray) -> sp.csr_array:
     """Return the share of each patch in the value at each corner, (n_points, n_patches); rows of corners sum to 1."""
+    n_points = graph.shape[0]
     patch = np.full(n_points, -1)
     patch[own] = np.arange(len(own))
     lender = np.zeros(n_points, bool)
     lender[inner] = True
     rows, columns, shares = [own], [patch[own]], [np.ones(len(own))]
     pending = np.setdiff1d(used, own)
-    graph = topology.node_graph(mesh, n_points).astype(bool)
     reach = graph[pending]
     while len(pending):
         borrower, j = reach.nonzero()
