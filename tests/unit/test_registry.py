@@ -68,8 +68,14 @@ def keywords() -> list[tuple[str, str]]:
 
 def test_every_keyword_appears_in_a_script() -> None:
     """In a golden script, an example or a procedure: by its first four letters."""
-    scripts = [*ROOT.glob("tests/golden/**/*.dgibi"), *ROOT.glob("examples/**/*.dgibi"), *ROOT.glob("scripts/**/*.procedur")]
-    text = "\n".join([*(p.read_text(encoding="utf-8", errors="replace") for p in scripts), *(op.example for op in EVERY)])
+    scripts = [
+        *ROOT.glob("tests/golden/**/*.dgibi"),
+        *ROOT.glob("examples/**/*.dgibi"),
+        *ROOT.glob("scripts/**/*.procedur"),
+    ]
+    text = "\n".join(
+        [*(p.read_text(encoding="utf-8", errors="replace") for p in scripts), *(op.example for op in EVERY)]
+    )
     used = {word[:4] for word in re.findall(r"[A-Z][A-Z0-9_]*", text.upper())}
     missing = [f"{name} '{word}'" for name, word in keywords() if word[:4] not in used]
     assert not missing, f"{len(missing)} keywords that nothing tries: {', '.join(missing)}"

@@ -229,4 +229,11 @@ LANGUAGE = {
     "a number of {length} characters": "un nombre de {length} caractères",
     "at most {most} are read": "{most} au plus sont lus",
     "{directive} gives no result: write it without {name} =": "{directive} ne donne pas de résultat : ôter {name} =",
+    "objects of {name}: {objects}": "objets de {name} : {objects}",
+    "{file} defines no procedure: the name of the one it becomes is wanted": "{file} ne définit aucune procédure : le nom de celle qu'il devient est attendu",
+    "LIRE 'PROC' 'file' 'NAME' ;": "LIRE 'PROC' 'fichier' 'NOM' ;",
+    "{file} defines no procedure {name}": "{file} ne définit pas de procédure {name}",
+    "an instruction of {length} characters: Cast3M reads {most}": "une instruction de {length} caractères : Cast3M en lit {most}",
+    "split it; without --strict any length is accepted": "coupez-la ; sans --strict toute longueur est acceptée",
+    "it ends here": "elle finit ici",
 }

@@ -193,4 +193,5 @@ MESH = {
     "give opposite sides as many elements, or change one side by one": "donner autant d'éléments aux côtés opposés, ou en changer un d'une unité",
     "the sides have {counts} elements: opposite ones must have as many on a curved surface": "les côtés ont {counts} éléments : sur une surface courbe les côtés opposés doivent en avoir autant",
     "a mesh of TRI3 or TET4 is wanted, this one holds {shapes}": "il faut un maillage de TRI3 ou TET4, celui-ci contient {shapes}",
+    "a mesh of points is wanted, this one holds {shapes}": "un maillage de points est attendu, celui-ci contient {shapes}",
 }
