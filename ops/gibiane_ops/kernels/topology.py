@@ -106,9 +106,9 @@ def group_by_nodes(nodes: IntArray) -> tuple[IntArray, IntArray]:
     """
     if len(nodes) == 0:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    keys = np.sort(nodes, axis=1)
-    order = np.lexsort(keys.T)
-    starts = np.r_[True, (keys[order[1:]] != keys[order[:-1]]).any(axis=1)]
+    keys = _packed(np.sort(nodes, axis=1))
+    order = np.lexsort(keys)
+    starts = np.r_[True, np.any([key[order[1:]] != key[order[:-1]] for key in keys], axis=0)]
     group = np.empty(len(nodes), np.int64)
     group[order] = np.cumsum(starts) - 1
     # lexsort is stable, so the first row of each run is its first appearance.
@@ -116,6 +116,37 @@ def group_by_nodes(nodes: IntArray) -> tuple[IntArray, IntArray]:
     rank = np.empty(len(first), np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     return rank[group], np.sort(first)
+
+
+def _packed(rows: IntArray) -> list[IntArray]:
+    """Put the columns of rows into as few integers as hold them: fewer keys sort faster."""
+    low = int(rows.min())
+    bits = max(int(rows.max()) - low, 1).bit_length()
+    keys: list[IntArray] = []
+    room = 0
+    for column in rows.T:
+        if room < bits:
+            keys.append(column - low)
+            room = 63 - bits
+        else:
+            keys[-1] = (keys[-1] << bits) | (column - low)
+            room -= bits
+    return keys
+
+
+def used_nodes(cells: Sequence[IntArray]) -> IntArray:
+    """Return the distinct nodes of cells, increasing.
+
+    Parameters
+    ----------
+    cells : sequence of (m, n_nodes) int64
+        Nodes are not negative.
+    """
+    largest = max((int(block.max()) for block in cells if block.size), default=-1)
+    used = np.zeros(largest + 1, bool)
+    for block in cells:
+        used[block] = True
+    return np.flatnonzero(used)
 
 
 def boundary(blocks: Sequence[Block]) -> dict[str, Facets]:

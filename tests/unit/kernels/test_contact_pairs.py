@@ -101,3 +101,11 @@ def test_facets_are_turned_outwards():
         np.testing.assert_allclose(nodal_normals(points, [(name, cells)])[1], [[0, 0, 1]] * 4)
     with pytest.raises(EmptyContact):
         facets_of_body([("CUB8", cube)], [("QUA4", np.array([[0, 2, 5, 7]]))])
+
+
+def test_a_facet_between_two_cells_is_not_on_the_boundary():
+    cells = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    ((_, turned),) = facets_of_body([("QUA4", cells)], [("SEG2", np.array([[1, 0], [2, 5]]))])
+    assert turned.tolist() == [[0, 1], [2, 5]]
+    with pytest.raises(EmptyContact, match="1 facets"):
+        facets_of_body([("QUA4", cells)], [("SEG2", np.array([[0, 1], [1, 4]]))])

@@ -89,3 +89,24 @@ def test_empty_mesh() -> None:
     assert topology.solids([], 3)[0] == 0
     assert topology.edges([]).shape == (0, 2)
     assert topology.neighbours([]).shape == (0, 2)
+
+
+@pytest.mark.parametrize("scale", [1, 10**6, 10**15, 2**61])
+@pytest.mark.parametrize("offset", [0, -(2**40), 7])
+def test_rows_of_the_same_nodes_are_grouped_whatever_their_size(scale, offset):
+    rows = (
+        np.array([[0, 1, 2, 3], [3, 2, 1, 0], [0, 1, 2, 2], [1, 0, 3, 2], [2, 2, 1, 0], [0, 0, 0, 0]]) * scale + offset
+    )
+    group, first = topology.group_by_nodes(rows)
+    assert group.tolist() == [0, 0, 1, 0, 1, 2]
+    assert first.tolist() == [0, 2, 5]
+
+
+def test_used_nodes():
+    assert topology.used_nodes([np.array([[5, 2], [2, 9]]), np.zeros((0, 3), np.int64), np.array([[0]])]).tolist() == [
+        0,
+        2,
+        5,
+        9,
+    ]
+    assert topology.used_nodes([]).tolist() == []

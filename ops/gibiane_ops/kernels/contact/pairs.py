@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, EmptyContact
 from gibiane_ops.kernels.geometry import normal_densities
-from gibiane_ops.kernels.topology import Block, boundary, group_by_nodes
+from gibiane_ops.kernels.topology import Block, group_by_nodes
 
 ROUND_OFF = 1e-9
 """Distances below this fraction of the size of the surfaces are zero."""
@@ -229,17 +230,33 @@ def facets_of_body(body: Sequence[Block], surface: Sequence[Block]) -> list[Bloc
     EmptyContact
         When a facet is not on the boundary of the body.
     """
-    outside = boundary(body)
+    marked = np.zeros(1 + max((int(cells.max()) for _, cells in [*body, *surface] if cells.size), default=0), bool)
+    for _, cells in surface:
+        marked[cells] = True
     turned: list[Block] = []
     for name, cells in surface:
         if not len(cells):
             continue
         n_corners = shape(name).n_corners
-        skin = outside[name].nodes if name in outside else np.zeros((0, cells.shape[1]), np.int64)
+        skin = _facets_on(body, name, marked)
         group, first = group_by_nodes(np.concatenate([skin, cells])[:, :n_corners])
         match = first[group[len(skin) :]]
-        lost = int((match >= len(skin)).sum())
+        # A facet between two cells is not on the boundary.
+        shared = np.bincount(group[: len(skin)], minlength=len(first))[group[len(skin) :]] > 1
+        lost = int(((match >= len(skin)) | shared).sum())
         if lost:
             raise EmptyContact(f"{lost} facets of the surface are not on the boundary of the body")
         turned.append((name, skin[match]))
     return turned
+
+
+def _facets_on(body: Sequence[Block], name: str, marked: NDArray[np.bool_]) -> IntArray:
+    """Return the facets of one shape, turned outwards, of the cells of a body, whose corners are all marked."""
+    found = [np.zeros((0, shape(name).n_nodes), np.int64)]
+    corners = shape(name).n_corners
+    for of, cells in body:
+        for facet, local in shape(of).faces:
+            if facet == name:
+                on = marked[cells[:, local[:corners]]].all(axis=1)
+                found.append(cells[on][:, list(local)])
+    return np.concatenate(found)
