@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 from gibiane import faults, registry, slips
 from gibiane.blocks import annotate
-from gibiane.diagnostics import ERROR, Diagnostic, GibianeError, error, make, render
+from gibiane.diagnostics import ERROR, WARNING, Diagnostic, GibianeError, error, make, render
 from gibiane.evaluator import Evaluator
 from gibiane.frames import Frame, Resume, Stop
 from gibiane.library import Library, read_script
@@ -80,6 +80,7 @@ class Session:
         self.pager: Callable[[str], None] | None = None
         self.library = Library()
         self.worst = 0
+        self.concern = 0
         self.internal = False
         self.finished = False
         self.handed_over = False
@@ -123,6 +124,8 @@ class Session:
     def emit(self, diagnostic: Diagnostic) -> None:
         """Show a message of any level and remember the highest."""
         self.worst = max(self.worst, diagnostic.level)
+        if diagnostic.level == WARNING:
+            self.concern = int(diagnostic.code) if diagnostic.code.isdigit() else 1
         if diagnostic.level < ERROR and self.options["ECHO"] < 0:
             return
         self.out.flush()

@@ -53,16 +53,18 @@ def _density(ctx: Context, q: Operands) -> float:
     return value
 
 
+SUBMODES = {"PLAN": ("CONT", "DEFO", "GENE"), "UNID": ("PLAN", "AXIS", "SPHE")}
+DEFAULT_SUBMODES = {"PLAN": "DEFO", "UNID": "PLAN"}
+
+
 def _mode(ctx: Context, q: Operands) -> str:
     i = q.first_word()
-    # What VALE MODE gives is in one word: PLANCONT.
-    joined = str(q.values[i])[4:8].upper() if i >= 0 else ""
+    given = str(q.values[i]).strip() if i >= 0 else ""
     word = q.need_keyword(("PLAN", "AXIS", "TRID", "FOUR", "UNID"))
-    if word == "PLAN":
-        variants = ("CONT", "DEFO", "GENE")
-        return "PLAN " + (joined if joined in variants else q.read_keyword(variants) or "DEFO")
-    if word == "UNID":
-        return "UNID " + (q.read_keyword(("PLAN", "AXIS", "SPHE")) or "PLAN")
+    if word in SUBMODES:
+        choices = SUBMODES[word]
+        whole = next((choice for choice in choices if given[4:8] == choice), None)  # PLANCONT, as VALE gives it
+        return f"{word} {whole or q.read_keyword(choices) or DEFAULT_SUBMODES[word]}"
     if word == "FOUR":
         return f"FOUR {q.need(ENTIER)}"
     return word
@@ -242,28 +244,60 @@ VALE = operator(
     topic="language",
     summary="value of an option",
     terminal=True,
-    notice="Reads an option: DIME, ELEM, MODE (PLANDEFO, PLANCONT, AXIS, TRID), DENS, ECHO, ERRE; PREC PETI "
-    "GRAN are the precision, the smallest and the largest FLOTTANT. 'ERMA' is the highest error level so far.",
+    notice="Reads an option: what OPTI set, else what holds without it (an error when nothing does: DIME comes before "
+    "MODE). MODE is one word, PLANCONT or TRID; `VALE 'MODE' 'FOUR'` the harmonic. PREC, PETI and GRAN are the "
+    "precision, the smallest and the largest FLOTTANT. 'SOUC' is the number of the last warning, 'ERMA' the highest "
+    "error level so far. What VALE gives, OPTI takes back.",
     example="OPTI DIME 2 ; MESS (VALE DIME) ;",
     see=["OPTION"],
 )
 
 
+# what VALE says of an option that nobody has set: the units of files, and the habits of pictures
+UNSET: dict[str, Any] = {
+    "SORT": 2,
+    "SAUV": 8,
+    "REST": 7,
+    "ACQU": 9,
+    "LECT": 4,
+    "DONN": 5,
+    "IMPR": 6,
+    "EPTR": 1,
+    "ISOV": "SURFACE",
+    "COSC": "BLAN",
+    "RESO": "DIRECTE",
+    "LANG": "FRAN",
+    "TITR": "",
+    "VERI": 0,
+    "IMPI": 0,
+    "ASSI": 0,
+    "PARA": False,
+}
+
+
 @VALE.stream(
     *(Key(word, DOCS.get(word, NO_EFFECT)) for word in OPTIONS),
+    Key("SOUC", "number of the last warning, 0 when there is none"),
     Key("ERMA", "highest error level so far"),
     syntax="option:MOT",
 )
 def _vale(ctx: Context, q: Operands) -> Any:
-    word = q.need_keyword([*OPTIONS, "ERMA"])
+    word = q.need_keyword([*OPTIONS, "SOUC", "ERMA"])
     if word == "ERMA":
         return ctx.session.worst
+    if word == "SOUC":
+        return ctx.session.concern
     value = ctx.session.options.get(word)
-    if word == "MODE" and value is None:
-        value = {2: "PLAN DEFO", 3: "TRID"}.get(ctx.session.options["DIME"])
+    if word == "MODE":
+        mode = str(value or {2: "PLAN DEFO", 3: "TRID"}.get(ctx.session.options["DIME"], ""))
+        if q.read_keyword(["FOUR"]) is not None:
+            return int(mode[4:]) if mode.startswith("FOUR") else 0
+        value = "FOUR" if mode.startswith("FOUR") else mode.replace(" ", "") or None
+    if value is None:
+        value = UNSET.get(word)
     if value is None:
         ctx.fail(19, "the option {word} has no value yet", word=word)
-    return value.replace(" ", "") if word == "MODE" else value
+    return value
 
 
 TITR = operator(
