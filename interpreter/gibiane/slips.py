@@ -85,12 +85,32 @@ def mark(source: SourceText, program: list[Instr], *, thorough: bool = False) ->
         _mark_apostrophe(source, program)
     habits = Habits(program) if thorough else None
     for instr in program:
-        if instr.bad is None or instr.bad.code in ("1014", "315"):
+        comment = _foreign_comment(instr)
+        if comment is not None:
+            instr.bad = comment
+        elif instr.bad is None or instr.bad.code in ("1014", "315"):
             if habits is not None:
                 habits.look_at(instr)
             found = slip(instr, habits)
             if found is not None:
                 instr.bad = found
+
+
+def _foreign_comment(instr: Instr) -> Diagnostic | None:
+    """Find an instruction that begins like a comment of another language, or with a * that is not in column 1."""
+    text = instr.source.text
+    mark = text[instr.start : instr.start + 2]
+    if mark != "//":
+        mark = mark[:1] if mark[:1] in ("#", "*") or mark in ("! ", "!") else ""
+    if not mark:
+        return None
+    return make(
+        "G101",
+        "an instruction cannot begin with {mark}",
+        mark=mark,
+        span=Span(instr.source, instr.start, instr.start + len(mark)),
+        hint="a comment is a line with * in its first column; COMM 'text' ; may stand anywhere",
+    )
 
 
 # ---------------------------------------------------------------------------------------------- apostrophes

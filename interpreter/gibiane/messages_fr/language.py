@@ -5,6 +5,8 @@ LANGUAGE = {
     "a keyword is missing: {words}": "il manque un mot-clé : {words}",
     "a keyword is missing; accepted: {accepted}": "il manque un mot-clé ; acceptés : {accepted}",
     "unknown keyword '{word}'; accepted: {accepted}": "mot-clé inconnu '{word}' ; acceptés : {accepted}",
+    "an instruction cannot begin with {mark}": "une instruction ne peut pas commencer par {mark}",
+    "a comment is a line with * in its first column; COMM 'text' ; may stand anywhere": "un commentaire est une ligne avec * en première colonne ; COMM 'texte' ; peut être partout",
     "its operands are missing": "ses opérandes manquent",
     "its second operand is missing": "son second opérande manque",
     "two operands are wanted": "il faut deux opérandes",
