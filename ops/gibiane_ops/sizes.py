@@ -28,10 +28,10 @@ TAIL = operator(
     notice="`CH = TAILLE 'DIAMETRE_MIN' MODL`: the smallest length of each element (component L). "
     "`CHD = TAILLE 'ERREUR' CARTE MODL 'PREC' e0`: the sizes at the nodes of the coarsest mesh expected to have the "
     "relative error e0, from a map of relative errors (ERREUR; its component TOTA, or its only one). 'ORDRE' p is the "
-    "order of convergence (1 for linear elements), 'SING' lowers it where the error peaks; 'MINI' and 'MAXI' bound the "
-    "sizes, 'GRAD' their growth (1.5), 'NBMA' the number of elements; 'MINN' takes at a node the smallest size around "
-    "it rather than their geometric mean. `CHD NB = TAILLE ...` also gives the number of "
-    "elements that the sizes ask for. Nodes at one place in two solids (contact) get one size.",
+    "order of convergence (if absent 1 for linear elements, 2 for quadratic ones), 'SING' lowers it where the error "
+    "peaks; 'MINI' and 'MAXI' bound the sizes, 'GRAD' their growth (1.5), 'NBMA' the number of elements; 'MINN' takes "
+    "at a node the smallest size around it rather than their geometric mean. `CHD NB = TAILLE ...` also gives the "
+    "number of elements that the sizes ask for. Nodes at one place in two solids (contact) get one size.",
     example="""
     OPTI DIME 3 ELEM CUB8 ;
     S = (DROI 1 (0. 0. 0.) (1. 0. 0.)) TRAN 1 (0. 1. 0.) ; V = S VOLU 2 'TRAN' (0. 0. 1.) ;
@@ -122,13 +122,14 @@ def _wanted(
     nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
     points = store.coords[nodes][:, : zones[0].dim]
     blocks = [(z.shape, np.searchsorted(nodes, z.cells)) for z in zones]
-    order: float | FloatArray = 1.0 if ordre is None else ordre
+    degrees = np.concatenate([np.full(len(z.cells), float(shape(z.shape).degree)) for z in zones])
+    order: float | FloatArray = ordre if ordre is not None else degrees if np.ptp(degrees) else float(degrees[0])
     with worded(ctx, at="prec"):
         if sing:
             measures = np.concatenate([geometry.measures(shape(n), points[c]) for n, c in blocks])
-            order = singular_orders(
-                len(points), blocks, error**2, measures, float(order), beta=3.0 if zones[0].dim == 3 else 2.0
-            )
+            # Peaks of linear solid elements are sharper than those of plane or quadratic ones.
+            beta = 3.0 if zones[0].dim == 3 and degrees.max() == 1 else 2.0
+            order = singular_orders(len(points), blocks, error**2, measures, order, beta=beta)
         found = size_map(
             points,
             blocks,

@@ -6,13 +6,12 @@ import numpy as np
 
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.elements.quadratic import QUADRATIC
+from gibiane_ops.kernels.elements.quadratic import LINEAR
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import SHAPES
 from gibiane_ops.kernels.errors import BadValue
 
 SUPPORTS = ("NOEUD", "GRAVITE", "RIGIDITE", "MASSE", "STRESSES")
-LINEAR = {quadratic: linear for linear, quadratic in QUADRATIC.items()}
 
 
 def support_points(shape: Shape, support: str) -> FloatArray:

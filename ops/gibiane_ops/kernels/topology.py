@@ -13,6 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane_ops.kernels.arrays import IntArray
+from gibiane_ops.kernels.elements.quadratic import LINEAR
 from gibiane_ops.kernels.elements.table import shape
 
 Block = tuple[str, IntArray]
@@ -212,6 +213,41 @@ def edges(blocks: Sequence[Block]) -> IntArray:
     n = np.int64(every.max(initial=0) + 1)
     keys = np.unique(every[:, 0] * n + every[:, 1])
     return np.stack(np.divmod(keys, n), axis=1)
+
+
+def corner_blocks(blocks: Sequence[Block]) -> list[Block]:
+    """Keep the corners of the cells only: linear cells stay, those of second degree lose their mid-nodes.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    list of (str, (m, n_corners) int64)
+        The ids of the nodes do not change.
+    """
+    return [(LINEAR.get(name, name), cells[:, : shape(name).n_corners]) for name, cells in blocks]
+
+
+def middles(blocks: Sequence[Block]) -> IntArray:
+    """List the mid-nodes of cells of second degree with the ends of their edges.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    (k, 3) int64
+        The two ends, then the mid-node; once each, by increasing mid-node. A mid-node that is a corner of another
+        cell (smaller elements beside larger ones) is absent.
+    """
+    local = [(cells, np.array(shape(name).edges)) for name, cells in blocks if shape(name).degree == 2]
+    every = np.concatenate([np.zeros((0, 3), np.int64), *(cells[:, edges].reshape(-1, 3) for cells, edges in local)])
+    _, first = np.unique(every[:, 2], return_index=True)
+    corners = np.concatenate([cells.ravel() for _, cells in corner_blocks(blocks)])
+    return np.asarray(every[first][~np.isin(every[first, 2], corners)], np.int64)
 
 
 def node_to_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[IntArray, IntArray]:

@@ -149,3 +149,19 @@ def test_impossible_requests_are_refused(wrong):
     points, blocks = strip(1)
     with pytest.raises(BadValue):
         sizes.size_map(points, blocks, np.ones(6), **({"target": 0.1} | wrong))
+
+
+def test_mid_nodes_take_the_mean_of_their_edge():
+    # Two TE10 on one face, sizes 1 and 2 times the old ones: mid-nodes lie between the corners, also where sizes grow.
+    corners = np.vstack([np.zeros(3), np.eye(3), [1.0, 1.0, 1.0]])
+    cells = np.array([[0, 1, 2, 3], [1, 2, 3, 4]])
+    ends = np.sort(cells[:, np.array(shape("TET4").edges)], axis=2).reshape(-1, 2)
+    unique, middle = np.unique(ends, axis=0, return_inverse=True)
+    points = np.vstack([corners, corners[unique].mean(axis=1)])
+    quadratic = np.hstack([cells, len(corners) + middle.reshape(2, -1)])
+    for growth in (None, 1.2):
+        found = sizes.size_map(points, [("TE10", quadratic)], np.array([0.1, 0.3]), 0.2, order=2.0, growth=growth)
+        linear = sizes.size_map(corners, [("TET4", cells)], np.array([0.1, 0.3]), 0.2, order=2.0, growth=growth)
+        np.testing.assert_allclose(found.nodal[:5], linear.nodal, rtol=1e-12)
+        np.testing.assert_allclose(found.nodal[5:], found.nodal[unique].mean(axis=1), rtol=1e-12)
+        assert found.count == pytest.approx(linear.count, rel=1e-12)

@@ -129,7 +129,7 @@ def singular_orders(
     blocks: Sequence[Block],
     error2: FloatArray,
     measures: FloatArray,
-    order: float,
+    order: float | FloatArray,
     *,
     singular: float = SINGULAR_ORDER,
     beta: float = 3.0,
@@ -142,7 +142,7 @@ def singular_orders(
     blocks : list of (str, (m, n_nodes) int64)
     error2, measures : (n_cells,) float64
         Squared error and measure of each cell, through the blocks.
-    order : float
+    order : float or (n_cells,) float64
         Order away from singularities.
     singular : float
         Order of the elements that touch a singular node.
@@ -169,7 +169,7 @@ def singular_orders(
     whole = float(error2.sum() / measures.sum())
     peak = (density2 >= beta**2 * whole) & (whole > 0)
     touched = np.concatenate([peak[each].any(axis=1) for _, each in blocks])
-    return np.where(touched, min(singular, order), order)
+    return np.where(touched, np.minimum(singular, order), order)
 
 
 def nodal_sizes(
@@ -263,10 +263,10 @@ def predicted_count(points: FloatArray, blocks: Sequence[Block], sizes: FloatArr
     Returns
     -------
     float
-        ``sum int c h^-d``, c from `REGULAR`, h interpolated, with the mass rule of each shape.
+        ``sum int c h^-d``, c from `REGULAR`, h interpolated between the corners, with the mass rule of each shape.
     """
     total = 0.0
-    for name, cells in blocks:
+    for name, cells in topology.corner_blocks(blocks):
         of = shape(name)
         xi, weights = of.mass_gauss
         density = geometry.measure_densities(of, points[cells], xi) * weights
@@ -348,7 +348,8 @@ def size_map(
     Notes
     -----
     Averaging to the nodes smooths the sizes and so changes the number of elements that they ask for; the nodal field
-    is multiplied by one number that restores the optimum. Without any error the sizes stay as they are.
+    is multiplied by one number that restores the optimum. Without any error the sizes stay as they are. Mid-nodes
+    take the mean of the two ends of their edge.
     """
     orders = np.asarray(order, np.float64)
     for what, value in (("target", target), ("order", float(orders.min())), ("largest size", largest)):
@@ -360,6 +361,7 @@ def size_map(
         raise BadValue("largest number of elements", max_count, "a positive number")
     dim = shape(blocks[0][0]).dim
     measures = [geometry.measures(shape(name), points[cells]) for name, cells in blocks]
+    middles, blocks = topology.middles(blocks), topology.corner_blocks(blocks)
     old = np.concatenate([element_sizes(shape(name), each) for (name, _), each in zip(blocks, measures, strict=True)])
     error2 = np.asarray(error, np.float64) ** 2
     if not error2.any():
@@ -379,4 +381,5 @@ def size_map(
     if max_count is not None and count > max_count:
         nodal *= (count / max_count) ** (1 / dim)
         count = float(max_count)
+    nodal[middles[:, 2]] = nodal[middles[:, :2]].mean(axis=1)
     return SizeMap(nodal, count, optimum, ratios)

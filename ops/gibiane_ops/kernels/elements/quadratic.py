@@ -18,6 +18,7 @@ QUADRATIC = {
     "PRI6": "PR15",
     "CUB8": "CU20",
 }
+LINEAR = {quadratic: linear for linear, quadratic in QUADRATIC.items()}
 
 
 def ref_nodes(linear: Shape) -> FloatArray:

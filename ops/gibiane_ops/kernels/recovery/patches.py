@@ -12,7 +12,6 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock
 from gibiane_ops.kernels.recovery.fits import Samples, fit
 from gibiane_ops.kernels.recovery.samples import superconvergent_samples
-from gibiane_ops.kernels.supports import LINEAR
 from gibiane_ops.kernels.topology import Block
 
 
@@ -50,7 +49,8 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     Batches of small symmetric matrices (up to 6 x 6), one per inner corner; no loop over nodes.
     """
     n_points = len(points)
-    mesh = [(LINEAR.get(b.shape.name, b.shape.name), b.cells[:, : b.shape.n_corners]) for b in blocks]
+    whole = [(block.shape.name, block.cells) for block in blocks]
+    mesh = topology.corner_blocks(whole)
     used = np.unique(np.concatenate([corners.ravel() for _, corners in mesh]))
     inner, own = _patch_nodes(mesh, used, n_points)
     highest = np.full(n_points, 2 if degree is None else degree)
@@ -63,7 +63,7 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     straight = all(block.shape.degree == 1 for block in blocks)
     graph = topology.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
     weights = _lending(graph.astype(bool), used, inner, own)
-    shares = (weights + _middles(blocks, used, n_points) @ weights).tocoo()
+    shares = (weights + _middles(whole, n_points) @ weights).tocoo()
     node, patch = shares.coords
     fitted = shares.data[:, None] * fits.at(patch, points[node])
     total = sp.csr_array((np.ones(len(node)), (node, np.arange(len(node)))), shape=(n_points, len(node))) @ fitted
@@ -111,15 +111,8 @@ def _lending(graph: sp.csr_array, used: IntArray, inner: IntArray, own: IntArray
     return sp.csr_array(entries, shape=(n_points, len(own)))
 
 
-def _middles(blocks: Sequence[StressBlock], corners: IntArray, n_points: int) -> sp.csr_array:
+def _middles(blocks: Sequence[Block], n_points: int) -> sp.csr_array:
     """Return the matrix of the means over the two ends of the edge of each mid-node, (n_points, n_points)."""
-    edges = [b.cells[:, np.array(b.shape.edges)].reshape(-1, 3) for b in blocks if b.shape.degree == 2]
-    if not edges:
-        return sp.csr_array((n_points, n_points))
-    every = np.concatenate(edges)
-    _, first = np.unique(every[:, 2], return_index=True)
-    once = every[first]
-    # Beside smaller elements a mid-node may be one of their corners, with a value already.
-    once = once[~np.isin(once[:, 2], corners)]
-    rows = np.repeat(once[:, 2], 2)
-    return sp.csr_array((np.full(len(rows), 0.5), (rows, once[:, :2].ravel())), shape=(n_points, n_points))
+    edges = topology.middles(blocks)
+    rows = np.repeat(edges[:, 2], 2)
+    return sp.csr_array((np.full(len(rows), 0.5), (rows, edges[:, :2].ravel())), shape=(n_points, n_points))
