@@ -11,7 +11,7 @@ from gibiane.nodes import Instr, Literal, Name, Node, Target
 from gibiane.registry import Operator, find, spellings
 from gibiane.runner import Runner
 from gibiane.source import Span
-from gibiane.values import ENTIER, FLOTTANT, Procedure, type_of
+from gibiane.values import ENTIER, FLOTTANT, POINT, Procedure, type_of
 
 
 def leftover(ev: Runner, q: Operands, at: int, full: Operands | None = None) -> GibianeError:
@@ -35,7 +35,12 @@ def leftover(ev: Runner, q: Operands, at: int, full: Operands | None = None) -> 
         failure.hint = Text("does {name} take so many arguments?", {"name": procedure.name})
         failure.forms = [procedures.usage(procedure)]
     elif len(whole.values) > 1 and all(type_of(v) in (ENTIER, FLOTTANT) for v in whole.values):
-        failure.hint = Text("an operator is missing between the values, or a ; between two instructions")
+        failure.hint = _numbers_hint(ev, whole)
+    elif type_of(whole.values[0]) == POINT and all(type_of(v) in (ENTIER, FLOTTANT) for v in whole.values[1:]):
+        failure.hint = Text("a point has two coordinates after OPTI DIME 2, three after OPTI DIME 3")
+    elif type_of(whole.values[0]).startswith("LIST") and len(whole.values) == 2 and type_of(whole.values[1]) == ENTIER:
+        fields = {"list": whole.nodes[0].name if isinstance(whole.nodes[0], Name) else "L", "number": whole.values[1]}
+        failure.hint = Text("EXTR {list} {number} gives the value of that number in a list", fields)
     elif (op := _first_operator(ev)) is not None and isinstance(q.values[at], str):
         failure.hint = Text(
             "{directive} does not read it: INFO {directive} ; tells what it reads", {"directive": op.name}
@@ -43,6 +48,18 @@ def leftover(ev: Runner, q: Operands, at: int, full: Operands | None = None) -> 
     else:
         failure.hint = Text("an operator is missing, or a ; between two instructions")
     return GibianeError(failure)
+
+
+def _numbers_hint(ev: Runner, whole: Operands) -> Text:
+    """Say what numbers side by side may have been meant for: a point, a decimal comma, an operation."""
+    dim, count = ev.session.options["DIME"], len(whole.values)
+    first, last = (whole.span(whole.nodes[i]) for i in (0, -1))
+    between = whole.source.text[first.end : last.start]
+    if count == 2 and between == ",":
+        return Text("the decimal point is a point: 3.5")
+    if dim < 2 and count in (2, 3):
+        return Text("an operator is missing between them; for a point, OPTI DIME {count} ; comes first", {"count": count})
+    return Text("an operator is missing between the values, or a ; between two instructions")
 
 
 def _stopped_by(ev: Runner, q: Operands, at: int, unread: Node) -> GibianeError | None:

@@ -101,7 +101,8 @@ def _foreign_comment(instr: Instr) -> Diagnostic | None:
     text = instr.source.text
     mark = text[instr.start : instr.start + 2]
     if mark != "//":
-        mark = mark[:1] if mark[:1] in ("#", "*") or mark in ("! ", "!") else ""
+        named = mark[:1] == "#" and mark[1:2].strip() and instr.bad is not None and instr.bad.code == "315"
+        mark = mark[:1] if (mark[:1] in ("#", "*") and not named) or mark in ("! ", "!") else ""
     if not mark:
         return None
     return make(
