@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,25 +9,34 @@ import numpy as np
 from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, extend
-from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, Table, type_of
-from gibiane_ops.kernels.estimate.combine import RelativeError, combine, facets_to_cells
+from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, type_of
+from gibiane_ops.kernels.estimate.combine import combine, facets_to_cells
 from gibiane_ops.kernels.estimate.contact import contact_error
-from gibiane_ops.kernels.estimate.zz import SolidError, solid_error
+from gibiane_ops.kernels.estimate.zz import solid_error
 from gibiane_ops.values.algebra import SCAL, SCALAIRE, added, values_of
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import SolvedContact, solved_contacts
+from gibiane_ops.values.estimates import (
+    KIND,
+    NORM,
+    REFE,
+    SMOOTHED,
+    TABL,
+    Parts,
+    field_of,
+    results,
+    stresses_of,
+    table_of,
+)
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Block, Maillage
-from gibiane_ops.values.material import MATERIAL, STRESS, elastic_compliance, told_apart
+from gibiane_ops.values.material import elastic_compliance
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, node_store
-from gibiane_ops.values.results import wanted_results
 from gibiane_ops.values.smoothed import METHODS, Solid, smoothed
 
 ERRE = extend("ERREUR")
-HOW = Key((*METHODS, "RESI", "RDC"), "smoothing of the stresses (as LISSER)", name="method")
-NORM = Key(("USUEL", "THESE"), "relative to the energy plus the error (default), or as in the thesis", name="norm")
-TABL = Key("TABLE", "all results in one TABLE", name="tabl")
+HOW = Key(METHODS, "smoothing of the stresses (as LISSER)", name="method")
 
 
 @ERRE.form(Arg("a", CHPOINT, "field"), Arg("b", CHPOINT, "field"), gives=[FLOTTANT])
@@ -37,25 +45,9 @@ def _difference(ctx: Context, a: ChPoint, b: ChPoint) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    """Zones of the model with their errors, in one order."""
-
-    zones: list[ModelZone]
-    errors: list[SolidError]
-
-
 def _solid_part(
     ctx: Context, model: Modele, stress: MChaml, material: MChaml, method: str, smooth: MChaml | None
-) -> _Parts:
-    if method in ("RESI", "RDC"):
-        ctx.fail(
-            251,
-            "the estimate '{method}' is not available yet",
-            at="method",
-            method=method,
-            hint="SPR, MOYE, MOYC and PROJ are",
-        )
+) -> Parts:
     solids: list[Solid] = smoothed(ctx, model, stress, method, smooth)
     zones, errors = [], []
     for solid in solids:
@@ -64,24 +56,7 @@ def _solid_part(
             with worded(ctx, at="model"):
                 errors.append(solid_error(solid.points, block, solid.nodal, compliance, axisymmetric=zone.axisymmetric))
             zones.append(zone)
-    return _Parts(zones, errors)
-
-
-def _stresses(ctx: Context, sig: MChaml, mat: MChaml, smooth: MChaml | None) -> tuple[MChaml, MChaml, MChaml | None]:
-    """Tell the stress, the material and the smoothed stress (the one at the nodes) apart."""
-    given = [("sig", sig), ("mat", mat), ("smooth", smooth)]
-    if smooth is None:
-        stress, material = told_apart(ctx, given, STRESS, MATERIAL)
-        return stress, material, None
-    stress, other, material = told_apart(ctx, given, STRESS, STRESS, MATERIAL)
-    return (other, material, stress) if stress.support == "NOEUD" else (stress, material, other)
-
-
-def _map(zones: list[ModelZone], values: list[FloatArray]) -> MChaml:
-    """Return one value per element as an element field."""
-    return MChaml(
-        [ChamZone(z, [SCAL], v[:, None, None]) for z, v in zip(zones, values, strict=True)], SCALAIRE, "GRAVITE"
-    )
+    return Parts(zones, errors)
 
 
 @ERRE.form(
@@ -90,9 +65,10 @@ def _map(zones: list[ModelZone], values: list[FloatArray]) -> MChaml:
     Arg("mat", MCHAML, "material"),
     Arg("smooth", MCHAML, "smoothed stress (LISSER); made here if absent", optional=True),
     HOW,
-    Key(("ABSOLU", "RELATIF", "LOCAL"), "what the map holds", name="kind"),
+    KIND,
     NORM,
     TABL,
+    REFE,
     gives=[FLOTTANT, MCHAML, "(FLOTTANT)"],
 )
 def _indicator(
@@ -105,41 +81,16 @@ def _indicator(
     kind: str | None,
     norm: str | None,
     tabl: bool,
+    refe: Any,
 ) -> Any:
-    stress, material, smooth = _stresses(ctx, sig, mat, smooth)
-    classical = method is None and smooth is None and kind is None and norm is None and not tabl
+    stress, material, smooth = stresses_of(ctx, sig, mat, smooth)
+    classical = method is None and smooth is None and kind is None and norm is None and not tabl and refe is None
     parts = _solid_part(ctx, model, stress, material, method or ("MOYE" if classical else "SPR"), smooth)
-    errors = parts.errors
-    found = combine(errors, norm="THES" if norm == "THESE" else "USUE")
-    shares = [e.error / np.maximum(e.error + e.energy, np.finfo(float).tiny) for e in errors]
     if classical:
-        return found.total, _map(parts.zones, shares)
-    if kind == "ABSOLU":
-        chosen = [np.sqrt(e.error) for e in errors]
-    else:
-        chosen = [np.sqrt(share) for share in shares] if kind == "LOCAL" else found.solid_map
-    field = _map(parts.zones, chosen)
-    if tabl:
-        return _table(found, parts, field, norm)
-    return (found.total, field, found.absolute) if wanted_results(ctx) > 2 else (found.total, field)
-
-
-def _table(found: RelativeError, parts: _Parts, field: MChaml, norm: str | None) -> Table:
-    table = Table()
-    for index, value in {
-        "GLOBALE": found.total,
-        "SOLIDE": found.solid,
-        "CONTACT": found.contact,
-        "ABSOLUE": found.absolute,
-        "ENERGIE": found.energy,
-        "NBEL": sum(z.mesh.n_cells for z in parts.zones),
-        "NORME": (norm or "USUEL")[:4],
-        "CARTE": field,
-        "GARANTI": False,
-        "RAISON": "a smoothed stress estimates the error; only an equilibrated stress bounds it",
-    }.items():
-        table.set(index, value)
-    return table
+        found = combine(parts.errors)
+        shares = [e.error / np.maximum(e.error + e.energy, np.finfo(float).tiny) for e in parts.errors]
+        return found.total, field_of(parts.zones, shares)
+    return results(ctx, parts, kind, norm, tabl, SMOOTHED, refe)
 
 
 @ERRE.form(
@@ -201,7 +152,7 @@ def _with_contact(
     rest: list[Any] = [field for pair in fields if pair is not of_contact and (field := pair[1]) is not None]
     if len(rest) < 2:
         raise ctx.operands.missing(MCHAML, "the stress and the material of the solids")
-    stress, material, smooth = _stresses(ctx, rest[0], rest[1], rest[2] if len(rest) > 2 else None)
+    stress, material, smooth = stresses_of(ctx, rest[0], rest[1], rest[2] if len(rest) > 2 else None)
     parts = _solid_part(ctx, model, stress, material, method or "SPR", smooth)
     blocks = [(z.shape, z.cells) for z in parts.zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
@@ -221,7 +172,7 @@ def _with_contact(
     ]
     field = MChaml(zones, SCALAIRE, "GRAVITE", "error")
     if tabl:
-        table = _table(result, parts, field, norm)
+        table = table_of(result, parts, field, norm, SMOOTHED)
         table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE", "error"))
         return table
     return result.solid, result.contact, result.total, field
@@ -261,10 +212,12 @@ def _incomplete(ctx: Context, q: Operands) -> Any:
     present = [type_of(v) for v in q.values]
     if not {MMODEL, MCHAML} & set(present):
         return Refused
-    contact = any(isinstance(v, str) and v[:4] == "CONT" for v in q.values)
-    wanted = {MMODEL: 1, MCHAML: 3 if contact else 2, CHPOINT: 2 if contact else 0}
+    words = {v[:4] for v in q.values if isinstance(v, str)}
+    contact, exact = "CONT" in words, "EXAC" in words and "PROC" not in words
+    wanted = {MMODEL: 1, MCHAML: 3 if contact or exact else 2, CHPOINT: 2 if contact else 0}
     missing = next((kind for kind, n in wanted.items() if present.count(kind) < n), None)
-    what = "stress SIG, material MAT" + (", contact material MATC" if contact else "")
+    what = "stress SIG, material MAT"
+    what += ", contact material MATC" if contact else ", exact stress SIGEX" if exact else ""
     names = {
         MMODEL: "the model MODL",
         MCHAML: f"one of its element fields ({what})",

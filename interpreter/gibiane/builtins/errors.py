@@ -17,7 +17,14 @@ ERRE = operator(
     notice="Directive: `ERRE 0` does nothing, `ERRE n` raises error n with its text and level (5 is fatal: how "
     "tests fail; 'AVEC' adds values), `ERRE 'text'` writes the text and raises error 308. OPTI "
     "ERRE says what an error does. "
-    "Operator: with a model, a stress field and a material, the error indicator.",
+    "Operator: `X CH (E) = ERREUR MODL SIG MAT`, the relative error of a stress in energy norm and its map by element "
+    "('ABSO', 'RELA', 'LOCA'; 'TABL': all in one TABLE, with GARANTI and its reason; 'REFE': the ratio THETA to the "
+    "true error and its scatter SD). 'MOYE' 'MOYC' 'PROJ' 'SPR' compare with a smoothed stress: estimates, not bounds, "
+    "often 0.6 to 0.95 of the error. 'RESI', explicit residuals: an estimate up to a factor ('CONS'), not a bound. "
+    "'RDC', constitutive relation error on TET4 and TRI3: a stress in exact equilibrium with the supports and loads "
+    "given ('PRES', 'FSUR', 'VOLU'); guaranteed: not below the error, and some 15 % above it after two sweeps "
+    "('BALA'). A facet counts as held where BLOQ holds all its nodes. 'EXAC': the true error, from an exact stress or "
+    "a procedure ('PROC'). 'CONTACT' adds the contact part: an estimate, not a bound.",
     example="OPTI ERRE IGNO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;",
     see=["OPTION"],
 )

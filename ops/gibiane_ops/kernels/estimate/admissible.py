@@ -31,6 +31,8 @@ class Admissible:
         ``int (sigma_hat - sigma_h) : D^-1 : (sigma_hat - sigma_h)`` of each cell.
     energy : (m,) float64, energy
         ``int sigma_h : D^-1 : sigma_h`` of each cell.
+    sum_energy : (m,) float64, energy
+        ``int (sigma_hat + sigma_h) : D^-1 : (sigma_hat + sigma_h)`` of each cell.
     history : list of float
         Estimate after the balance of tractions and after each sweep.
     residual : float
@@ -41,6 +43,7 @@ class Admissible:
     tau: FloatArray
     error: FloatArray
     energy: FloatArray
+    sum_energy: FloatArray
     history: list[float]
     residual: float
 
@@ -139,7 +142,8 @@ def admissible_stress(
             history.append(float(np.sqrt(errors(mesh, tau, sigma, compliance).sum())))
     error = errors(mesh, tau, sigma, compliance)
     energy = mesh.volume * np.einsum("ms,mst,mt->m", sigma, compliance, sigma)
-    return Admissible(mesh, tau, error, energy, history, equilibrium_residual(mesh, tau, exterior))
+    sums = errors(mesh, tau, -sigma, compliance)
+    return Admissible(mesh, tau, error, energy, sums, history, equilibrium_residual(mesh, tau, exterior))
 
 
 def stress_at_corners(mesh: Simplices, tractions: FloatArray, cells: IntArray | slice = slice(None)) -> FloatArray:

@@ -9,7 +9,8 @@ import numpy as np
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.elements.shape import Shape
-from gibiane_ops.kernels.recovery import StressBlock
+from gibiane_ops.kernels.quadrature import Rule
+from gibiane_ops.kernels.recovery import StressBlock, extrapolate
 from gibiane_ops.kernels.supports import extension
 
 
@@ -90,3 +91,56 @@ def _energy(stress: FloatArray, density: FloatArray, compliance: FloatArray) -> 
     """Integrate ``s : D^-1 : s`` over each cell; stress is (m, q, c), density (m, q)."""
     strain = np.matmul(stress, compliance)
     return np.asarray((density * (strain * stress).sum(axis=2)).sum(axis=1), np.float64)
+
+
+def true_error(
+    points: FloatArray,
+    block: StressBlock,
+    exact: FloatArray,
+    rule: Rule,
+    compliance: FloatArray,
+    *,
+    axisymmetric: bool = False,
+) -> SolidError:
+    """Compare the stresses of a block with the exact stress, cell by cell.
+
+    Parameters
+    ----------
+    points : (n_points, dim) float64, length
+    block : StressBlock
+    exact : (m, q, c) float64, force / length^2
+        Exact stress at the points of the rule.
+    rule : Rule
+        Of the block's shape. One point is not enough for linear simplices, whose stress is best there.
+    compliance : (c, c) or (m, c, c) float64, length^2 / force
+    axisymmetric : bool
+
+    Returns
+    -------
+    SolidError
+    """
+    X = points[block.cells]
+    density = geometry.measure_densities(block.shape, X, rule.points) * rule.weights
+    if axisymmetric:
+        density = density * geometry.circumferences(block.shape, X, rule.points)
+    raw = np.matmul(block.shape.N(rule.points), extrapolate(block.shape, block.stress))
+    return SolidError(
+        _energy(exact - raw, density, compliance),
+        _energy(raw, density, compliance),
+        _energy(exact + raw, density, compliance),
+    )
+
+
+def stress_energy(points: FloatArray, block: StressBlock, compliance: FloatArray) -> FloatArray:
+    """Integrate ``s_h : D^-1 : s_h`` over each cell by the stiffness rule, (m,).
+
+    Parameters
+    ----------
+    points : (n_points, dim) float64, length
+    block : StressBlock
+    compliance : (c, c) or (m, c, c) float64, length^2 / force
+    """
+    xi, density = _integration(block.shape, points[block.cells], False)
+    return _energy(
+        np.broadcast_to(block.stress, (len(block.cells), len(xi), block.stress.shape[2])), density, compliance
+    )

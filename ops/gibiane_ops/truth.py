@@ -1,0 +1,150 @@
+"""ERREUR 'EXAC': the true error of a stress, for verification."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, extend
+from gibiane.values import FLOTTANT, MCHAML, MMODEL, MOT, Table
+from gibiane_ops.kernels import geometry
+from gibiane_ops.kernels.elements.shape import Shape
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.estimate.zz import SolidError, true_error
+from gibiane_ops.kernels.quadrature import Rule
+from gibiane_ops.kernels.recovery import StressBlock
+from gibiane_ops.kernels.supports import moved
+from gibiane_ops.values.champs import MChaml
+from gibiane_ops.values.estimates import KIND, NORM, TABL, Guarantee, Parts, results
+from gibiane_ops.values.failures import worded
+from gibiane_ops.values.listes import ListReel
+from gibiane_ops.values.material import MATERIAL, STRESS, elastic_compliance, on_zone, solid_zones, told_apart
+from gibiane_ops.values.modele import Modele, ModelZone
+from gibiane_ops.values.nodes import FloatArray, node_store
+
+ERRE = extend("ERREUR")
+EXACT = Guarantee(True, "the true error, up to the integration of the exact stress")
+COMMON = (
+    Key("EXAC", "true error", required=True),
+    Arg("model", MMODEL, "model"),
+    Arg("sig", MCHAML, "stress"),
+    Arg("mat", MCHAML, "material"),
+)
+
+
+@ERRE.form(
+    *COMMON,
+    Arg("exact", MCHAML, "exact stress at the nodes, at the points of the mass or at the stress points"),
+    KIND,
+    NORM,
+    TABL,
+    gives=[FLOTTANT, MCHAML, "(FLOTTANT)"],
+)
+def _by_field(
+    ctx: Context,
+    exac: bool,
+    model: Modele,
+    sig: MChaml,
+    mat: MChaml,
+    exact: MChaml,
+    kind: str | None,
+    norm: str | None,
+    tabl: bool,
+) -> Any:
+    given = [("sig", sig), ("mat", mat), ("exact", exact)]
+    stress, truth, material = told_apart(ctx, given, STRESS, STRESS, MATERIAL)
+
+    def at_points(zone: ModelZone, of: Shape) -> tuple[Rule, FloatArray]:
+        values = on_zone(ctx, truth, zone, "exact").values
+        rule = of.mass_rule if truth.support in ("NOEUD", "MASSE") else of.stiffness_rule
+        if len(rule.weights) == 1 or values.shape[1] == 1:
+            ctx.fail(
+                26,
+                "one value an element does not show the error of {shape}, whose stress is best at the centre",
+                at="exact",
+                shape=zone.shape,
+                hint="give the exact stress at the nodes (CHAN 'CHAM') or at the points 'MASSE'",
+            )
+        return rule, moved(of, values, truth.support, "MASSE" if rule is of.mass_rule else "STRESSES")
+
+    return _true(ctx, model, stress, material, at_points, kind, norm, tabl)
+
+
+@ERRE.form(
+    *COMMON,
+    Key(
+        "PROC",
+        "name of a procedure T = NAME X Y (Z): coordinates of points, LISTREEL, to a TABLE of LISTREEL of stresses, "
+        "T.'SMXX' and so on; those that are absent are zero",
+        Arg("name", MOT),
+        name="proc",
+        required=True,
+    ),
+    KIND,
+    NORM,
+    TABL,
+    gives=[FLOTTANT, MCHAML, "(FLOTTANT)"],
+)
+def _by_procedure(
+    ctx: Context,
+    exac: bool,
+    model: Modele,
+    sig: MChaml,
+    mat: MChaml,
+    proc: str,
+    kind: str | None,
+    norm: str | None,
+    tabl: bool,
+) -> Any:
+    stress, material = told_apart(ctx, [("sig", sig), ("mat", mat)], STRESS, MATERIAL)
+
+    def at_points(zone: ModelZone, of: Shape) -> tuple[Rule, FloatArray]:
+        X = node_store(ctx).coords[zone.cells][..., : zone.dim]
+        where = geometry.positions(of, X, of.mass_rule.points)
+        given = ctx.call(proc, *(ListReel(where[..., i].ravel()) for i in range(zone.dim)))
+        if len(given) != 1 or not isinstance(given[0], Table):
+            ctx.fail(26, "the procedure {name} must return one TABLE", at="proc", name=proc)
+        values = np.zeros((*where.shape[:2], len(zone.stresses)))
+        for i, name in enumerate(zone.stresses):
+            if given[0].has(name):
+                column = given[0].get(name)
+                if not isinstance(column, ListReel) or len(column.values) != where[..., 0].size:
+                    ctx.fail(
+                        212,
+                        "{name}.'{component}' must be a LISTREEL of {count} values, one a point",
+                        at="proc",
+                        name=proc,
+                        component=name,
+                        count=where[..., 0].size,
+                    )
+                values[..., i] = column.values.reshape(where.shape[:2])
+        return of.mass_rule, values
+
+    return _true(ctx, model, stress, material, at_points, kind, norm, tabl)
+
+
+def _true(
+    ctx: Context,
+    model: Modele,
+    stress: MChaml,
+    material: MChaml,
+    at_points: Any,
+    kind: str | None,
+    norm: str | None,
+    tabl: bool,
+) -> Any:
+    zones, errors = solid_zones(ctx, model), []
+    for zone in zones:
+        of = shape(zone.shape)
+        raw = moved(of, on_zone(ctx, stress, zone, "sig").values, stress.support, "STRESSES")
+        rule, exact = at_points(zone, of)
+        points = node_store(ctx).coords[:, : zone.dim]
+        law = elastic_compliance(ctx, material, zone, "mat")
+        with worded(ctx, at="model"):
+            found: SolidError = true_error(
+                points, StressBlock(of, zone.cells, raw), exact, rule, law, axisymmetric=zone.axisymmetric
+            )
+        errors.append(found)
+    return results(ctx, Parts(zones, errors), kind, norm, tabl, EXACT, None)
