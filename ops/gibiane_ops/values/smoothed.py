@@ -66,14 +66,16 @@ def solids_of(zones: list[ModelZone]) -> list[list[ModelZone]]:
     return groups
 
 
-def smoothed(ctx: Context, model: Modele, stress: MChaml, method: str, given: MChaml | None = None) -> list[Solid]:
+def smoothed(
+    ctx: Context, model: Modele, stress: MChaml, method: str, given: MChaml | None = None, degree: int | None = None
+) -> list[Solid]:
     """Smooth the stresses of every solid of a model, or take them from a field at the nodes that is `given`.
 
-    Patches that had to fall back on the mean are told in a warning.
+    `degree` bounds that of the patches. Patches that miss terms for want of elements are told in a note.
     """
     store = node_store(ctx)
     solids = []
-    fallbacks = 0
+    fallbacks = flattened = 0
     if any(z.bars for z in model.zones):
         ctx.fail(251, "stresses of bars cannot be smoothed: a model of massive elements is wanted", at="model")
     for zones in solids_of(solid_zones(ctx, model)):
@@ -86,7 +88,7 @@ def smoothed(ctx: Context, model: Modele, stress: MChaml, method: str, given: MC
             blocks.append(StressBlock(of, np.searchsorted(nodes, zone.cells), values))
         if given is None:
             try:
-                found = recovery.recover(points, blocks, method)
+                found = recovery.recover(points, blocks, method, degree)
             except NotConverged as failure:
                 ctx.fail(
                     997,
@@ -96,6 +98,7 @@ def smoothed(ctx: Context, model: Modele, stress: MChaml, method: str, given: MC
                 )
             nodal = found.nodal
             fallbacks += found.fallbacks
+            flattened += found.flattened
         else:
             nodal = _given(ctx, given, zones, nodes, blocks)
         solids.append(Solid(zones, points, nodes, blocks, nodal))
@@ -105,6 +108,14 @@ def smoothed(ctx: Context, model: Modele, stress: MChaml, method: str, given: MC
             "{count} patches have too few elements: their nodes take the mean of the elements around them",
             count=fallbacks,
             hint="a finer mesh, or LISSER 'MOYE'",
+        )
+    if flattened:
+        ctx.warn(
+            "G411",
+            "{count} patches have too few elements to see every curvature: there the stress is taken straight",
+            level=0,
+            count=flattened,
+            hint="two layers of elements or more, or LISSER 'MOYE'",
         )
     return solids
 
