@@ -22,6 +22,7 @@ LEVELS: dict[str, int] = {
     "G411": NOTE,
     "G412": WARNING,
     "G413": WARNING,
+    "G415": WARNING,
     "G900": FATAL,
 }
 G_CODES = {
@@ -45,6 +46,7 @@ G_CODES = {
     "G412": "no progress between passes",
     "G413": "several contact solutions",
     "G414": "too large for the memory",
+    "G415": "solution of an ill-conditioned system",
     "G501": "file cut or of unknown format",
     "G900": "internal failure",
 }

@@ -202,8 +202,11 @@ def _obtain(ctx: Context, q: Operands) -> None:
 LIRE = operator(
     "LIRE",
     topic="files",
-    summary="read a file: a table of numbers, procedures",
-    notice="'CSV': a TABLE of LISTREEL, one per column ('COLO', the usual) or per line ('LIGN'). 'SEPA' is "
+    summary="read a file: a table of numbers, meshes, procedures",
+    notice="'MED' (needs h5py), 'UNV', 'GMSH', 'ABAQ' (Abaqus), 'NAS' (Nastran), 'AVS', 'VTK' (.vtu .vtk): a TABLE "
+    "whose indices are the names of the groups of elements and nodes, and of the fields; 'MAILLAGE' is the whole mesh. "
+    "Groups that have only a number are REF1, REF2 ... 'STL': a MAILLAGE of triangles. "
+    "'CSV': a TABLE of LISTREEL, one per column ('COLO', the usual) or per line ('LIGN'). 'SEPA' is "
     "the separator (a semicolon), 'DEBU' and 'FIN' the first and last line read. When the first line "
     "holds no numbers, its words are the indices of the columns; for lines they are a LISTMOTS at "
     "index 1. 'PROC' defines the procedures of a file, or the one that is named; a file without DEBP becomes the "

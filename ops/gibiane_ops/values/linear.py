@@ -198,7 +198,7 @@ def _check_energy(ctx: Context, system: System, u: FloatArray, F: FloatArray, r:
     gap = np.divide(np.abs(energy - work), size, out=np.zeros_like(size), where=size > 0)
     if gap.max(initial=0.0) > ENERGY_LIMIT:
         ctx.warn(
-            "G414",
+            "G415",
             "the strain energy of the solution differs from the work of the loads by {gap} of it",
             gap=f"{gap.max():.1e}",
             hint="the matrix is ill conditioned: very different stiffnesses, flat elements, or a solid barely held",
