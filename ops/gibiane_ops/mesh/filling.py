@@ -130,7 +130,14 @@ def lines_of(mesh: Maillage) -> IntArray:
     return cells if len(cells) else np.zeros((0, 2), np.int64)
 
 
-def _contour(ctx: Context, g: Maillage, at: str) -> IntArray:
+def contour_of(ctx: Context, g: Maillage, at: str) -> IntArray:
+    """Return the segments of closed lines, corners only.
+
+    Raises
+    ------
+    GibianeError
+        16 when it holds anything but lines, 28 when they are open.
+    """
     g = linear_mesh(ctx, g)
     segments = lines_of(g)
     if len(segments) == 0 or len(g.shapes) > 1:
@@ -188,7 +195,7 @@ def _surface(ctx: Context, g: Maillage, size: Size, on: Any) -> Maillage:
             kind=on[0],
             hint="DALL can put its nodes on a sphere, a cylinder or a cone",
         )
-    filled = fill_contour(ctx, _contour(ctx, g, "g"), size, surface_shape(ctx) == "QUA4", "g")
+    filled = fill_contour(ctx, contour_of(ctx, g, "g"), size, surface_shape(ctx) == "QUA4", "g")
     return finished(ctx, filled, wants_quadratic(ctx, g))
 
 
@@ -200,7 +207,7 @@ def _envelope(ctx: Context, g: Maillage, at: str) -> IntArray:
             16,
             "this envelope holds quadrangles (QUA4); tetrahedra need triangles",
             at=at,
-            hint="CHAN TRI3 cuts quadrangles in two",
+            hint="CHAN TRI3 cuts quadrangles in two; a surface is swept by VOLU N 'TRAN' V",
         )
     if len(facets) == 0 or len(g.shapes) > 1:
         ctx.fail(
@@ -258,5 +265,5 @@ def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None) -> Maillag
             hint="triangles (TRI3) or quadrangles (QUA4) fill lines, tetrahedra (TET4) fill surfaces",
         )
     if flat:
-        return fill_contour(ctx, _contour(ctx, g, "g"), size, kind == "QUA4", "g")
+        return fill_contour(ctx, contour_of(ctx, g, "g"), size, kind == "QUA4", "g")
     return fill_envelope(ctx, _envelope(ctx, g, "g"), size, "g")

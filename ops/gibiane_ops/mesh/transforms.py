@@ -52,7 +52,7 @@ MOIN = operator(
 )
 
 
-def _shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[[FloatArray, Any], FloatArray]:
+def shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[[FloatArray, Any], FloatArray]:
     """Return the function that moves coordinates of given nodes."""
     if isinstance(by, Point):
         vector = sign * by.coords
@@ -66,6 +66,8 @@ def _shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[
         )
     # UZ is a name of two families, hence the largest number of names in common.
     names = max(DISPLACEMENTS.values(), key=lambda family: len(set(family) & set(by.names)))
+    if not set(names) & set(by.names):
+        ctx.fail(181, "the field has no displacement; it has {known}", at=at, known=" ".join(by.names) or "none")
 
     def move(x: FloatArray, nodes: Any) -> FloatArray:
         result = x.copy()
@@ -79,15 +81,13 @@ def _translated(ctx: Context, objects: list[Any], sign: float) -> Any:
     *moved, by = objects
     if not moved:
         ctx.fail(37, "no object to move, or no vector", at="objects", hint="G PLUS (0. 0. 1.)")
-    return Copier(ctx, moved, _shift(ctx, by, sign)).results()
+    return Copier(ctx, moved, shift(ctx, by, sign)).results()
 
 
 def _moved_table(ctx: Context, t: Table, by: Point | ChPoint, sign: float) -> Table:
     keys = [key for key, _ in t.entries.values() if key != "SOUSTYPE"]
     result = t.copy()
-    for key, value in zip(
-        keys, Copier(ctx, [t.get(key) for key in keys], _shift(ctx, by, sign)).results(), strict=True
-    ):
+    for key, value in zip(keys, Copier(ctx, [t.get(key) for key in keys], shift(ctx, by, sign)).results(), strict=True):
         result.set(key, value)
     return result
 
@@ -261,7 +261,7 @@ def _move(ctx: Context, g: Maillage | Point, move: Callable[[FloatArray, Any], F
 
 @DEPL.form(WHAT, Key(("PLUS", "MOINS"), "translate", BY, name="how", required=True))
 def _depl(ctx: Context, g: Maillage | Point, how: tuple[str, Point | ChPoint]) -> None:
-    _move(ctx, g, _shift(ctx, how[1], 1.0 if how[0] == "PLUS" else -1.0, "how"))
+    _move(ctx, g, shift(ctx, how[1], 1.0 if how[0] == "PLUS" else -1.0, "how"))
 
 
 @DEPL.form(WHAT, Key("TOUR", "turn", Arg("angle", FLOTTANT), P1, Arg("p2", POINT, optional=True), required=True))

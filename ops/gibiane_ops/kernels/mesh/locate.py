@@ -44,7 +44,7 @@ def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray
     for _ in range(1 if affine else STEPS):
         own, XT = xi[rows], X[rows].transpose(0, 2, 1)
         gap = x[rows] - np.matmul(XT, kind.N(own)[:, :, None])[..., 0]
-        step = _solved(np.matmul(XT, kind.dN(own)), gap)
+        step = solve_small(np.matmul(XT, kind.dN(own)), gap)
         moved = np.clip(own + step, centre - 10.0, centre + 10.0)
         xi[rows] = moved
         rows = rows[np.abs(moved - own).max(axis=1, initial=0.0) > 1e-13]
@@ -53,7 +53,7 @@ def reference_coordinates(name: str, X: FloatArray, x: FloatArray) -> FloatArray
     return np.asarray(xi, np.float64)
 
 
-def _solved(jacobian: FloatArray, gap: FloatArray) -> FloatArray:
+def solve_small(jacobian: FloatArray, gap: FloatArray) -> FloatArray:
     """Solve small systems, (m, space_dim, dim) by (m, space_dim), in the sense of least squares.
 
     A flat element has no inverse: the result is then very large or without meaning, and its points are found outside.
