@@ -257,11 +257,12 @@ def _clipped(ctx: Context, q: Operands) -> Any:
             return Evolution(found)
         if number is None and len(given) > 1:
             ctx.fail(37, "this object has {count} curves: the number of one is wanted", at="curves", count=len(given))
-        if number is not None and not 1 <= number <= len(given):
+        chosen = 1 if number is None else number
+        if not 1 <= chosen <= len(given):
             ctx.fail(
-                1068, "there is no curve {number}: this object has {size}", at="curves", number=number, size=len(given)
+                1068, "there is no curve {number}: this object has {size}", at="curves", number=chosen, size=len(given)
             )
-        curve, _, y = given[(number or 1) - 1]
+        curve, _, y = given[chosen - 1]
         low = None if word == "MAXIMUM" else q.need(FLOTTANT, "the lower bound")
         high = None if word == "MINIMUM" else q.need(FLOTTANT, "the upper bound")
         if low is not None and high is not None and low > high:

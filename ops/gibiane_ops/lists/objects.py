@@ -132,14 +132,19 @@ def _join(ctx: Context, q: Operands) -> Any:
     if len(q.values) < 2 or not any(isinstance(v, ObjectList) for v in q.values[:2]):
         return Refused
     a, b = q.values[:2]
-    if isinstance(a, ListChpo) != isinstance(b, ListChpo) and CHPOINT not in (type_of(a), type_of(b)):
-        return Refused
-    ctx.places["b"] = q.nodes[1]
+    ctx.places["a"], ctx.places["b"] = q.nodes[:2]
     model = a if isinstance(a, ObjectList) else b
     objects = [*_several(model, a), *_several(model, b)]
-    kinds = list(dict.fromkeys(type_of(each) for each in objects))
-    if len(kinds) > 1 or (isinstance(model, ListChpo) and kinds not in ([], [CHPOINT])):
-        return Refused
+    expected = model.kind or (type_of(objects[0]) if objects else None)
+    wrong = next((each for each in objects if type_of(each) != expected), None)
+    if wrong is not None:
+        ctx.fail(
+            39,
+            "this list holds objects of type {kind}, not {type}",
+            at="b" if model is a else "a",
+            kind=expected,
+            type=type_of(wrong),
+        )
     del q.values[:2], q.nodes[:2]
     return type(model)(objects)
 
