@@ -108,16 +108,24 @@ class Operands:
             raise self.missing(wanted, what)
         return value
 
-    def missing(self, wanted: str, what: str | None = None) -> GibianeError:
-        """Return the error 37 for a type that is not there, with what stands in its place."""
+    def missing(self, wanted: str, what: str | None = None, *, keyword: bool = False) -> GibianeError:
+        """Return the error 37 for a type that is not there, with what stands in its place.
+
+        With `keyword` the first unread word is a keyword of the operator, and not to blame.
+        """
         labels, span = [], None
-        if self.values:
-            label = self.describe(0, wanted)
+        # An object that a failed instruction left without value is the likely culprit, wherever it stands.
+        lost = next((i for i, value in enumerate(self.values) if type_of(value) == ANNULE), None)
+        at = lost if lost is not None else self.first_word() + 1 if keyword else 0
+        if at < len(self.values):
+            label = self.describe(at, None if lost is not None else wanted)
             labels, span = [label], label.span
         template = "no {type} among its operands" if what is None else "no {type} ({what}) among its operands"
         failure = make(37, template, type=wanted, what=what, labels=labels, span=span)
-        failure.hint = self.session.state.get("makers", {}).get(wanted.split(" ")[0])
-        self.point_at_word(failure)
+        if lost is None:
+            failure.hint = self.session.state.get("makers", {}).get(wanted.split(" ")[0])
+        if not keyword:
+            self.point_at_word(failure)
         return GibianeError(failure)
 
     def point_at_word(self, failure: Diagnostic) -> None:
@@ -338,14 +346,20 @@ def _read_key(key: Key, word: str, q: Operands, bound: dict[str, Any]) -> Arg | 
 
 def explain(name: str, misses: list[Mismatch], q: Operands, *, symbolic: bool) -> GibianeError:
     """Word the failure of every form of the operator `name`: an unknown keyword, a missing operand, or wrong types."""
-    best = max(misses, key=lambda m: m.matched)
-    forms = [m.form.usage(name) for m in misses][:6]
     i = q.first_word()
+    first = q.values[i][:4] if i >= 0 and isinstance(q.values[i], str) else None
+    # A form whose keyword stands first is the one that was meant.
+    named = [m for m in misses if any(word[:4] == first for key in m.form.keys for word in key.words)]
+    best = max(named or misses, key=lambda m: m.matched)
+    said = {value[:4] for value in q.values if isinstance(value, str)}
+    meant = [m for m in misses if any(word[:4] in said for key in m.form.keys for word in key.words)]
+    forms = [m.form.usage(name) for m in named or meant or misses][:6]
     if symbolic:
         failure = _explain_infix(name, q)
         forms = []  # what every type of operands gives is of no help for two of them
     elif (
-        i >= 0
+        not named
+        and i >= 0
         and best.keys
         and isinstance(q.values[i], str)
         and not q.is_operator_word(i)
@@ -356,7 +370,8 @@ def explain(name: str, misses: list[Mismatch], q: Operands, *, symbolic: bool) -
         words = " or ".join(f"'{w}'" for w in best.wanted.words)
         failure = GibianeError(make(7, "a keyword is missing: {words}", words=words))
     elif best.wanted is not None:
-        failure = q.missing(" or ".join(best.wanted.types), best.wanted.doc if best.matched else None)
+        what = best.wanted.doc if best.matched else None
+        failure = q.missing(" or ".join(best.wanted.types), what, keyword=bool(named))
     else:
         failure = q.missing(ANY)
     failure.diagnostic.forms = forms
@@ -404,4 +419,6 @@ def _explain_infix(name: str, q: Operands) -> GibianeError:
         q.point_at_word(failure)
         return GibianeError(failure)
     labels = [q.describe(0)] if q.values else []
-    return GibianeError(make(533, "its operands are missing", labels=labels, span=labels[0].span if labels else None))
+    hint = "a sign belongs to a number only: write -1 * X" if name in "+-" and labels else None
+    span = labels[0].span if labels else None
+    return GibianeError(make(533, "its operands are missing", labels=labels, span=span, hint=hint))

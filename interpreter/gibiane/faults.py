@@ -58,7 +58,8 @@ def _numbers_hint(ev: Runner, whole: Operands) -> Text:
     if count == 2 and between == ",":
         return Text("the decimal point is a point: 3.5")
     if dim < 2 and count in (2, 3):
-        return Text("an operator is missing between them; for a point, OPTI DIME {count} ; comes first", {"count": count})
+        missing = "an operator is missing between them; for a point, OPTI DIME {count} ; comes first"
+        return Text(missing, {"count": count})
     return Text("an operator is missing between the values, or a ; between two instructions")
 
 

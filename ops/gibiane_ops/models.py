@@ -17,6 +17,14 @@ KINEMATICS = ("MESC", "SYME", "FAIB", "MORT", "NOEU", "RIGIDE")
 # Names of finite elements: that of the mesh is the default, and the only one that lines lack is BARR.
 ELEMENTS = ("BARR", *SHAPES)
 
+# Words that MODE of Cast3M takes and this one does not: formulations, behaviours, finite elements.
+ELSEWHERE = (
+    "THERMIQUE THERMOHYDRIQUE POREUX DARCY NAVIER_STOKES EULER MELANGE FISSURE LIQUIDE DIFFUSION CHARGEMENT METALLURGIE "
+    "ELECTROSTATIQUE MAGNETODYNAMIQUE CONVECTION RAYONNEMENT CONDUCTION ADVECTION PLASTIQUE PARFAIT FLUAGE ENDOMMAGEMENT "
+    "VISCOPLASTIQUE VISCOEXTERNE PLASTIQUE_ENDOM NON_LINEAIRE ANISOTROPE UNIDIRECTIONNEL IMPEDANCE SECTION POUT TIMO "
+    "TUYA COQ2 COQ3 COQ4 COQ6 COQ8 DKT DST BBAR JOI1 JOI2 JOI3 JOI4 C20R P15R ICQ4 QUAS TRIS POJS CERC LIA2"
+).split()
+
 MODE = operator(
     "MODELISER",
     topic="models",
@@ -64,8 +72,18 @@ def _mode(ctx: Context, q: Operands) -> Modele:
             q.need(MOT, "the name of the part")
         words.append(word)
     i = q.first_word()
-    if (i >= 0 and isinstance(q.values[i], str) and not q.is_operator_word(i)) or not words:
-        raise q.unknown_keyword([*FORMULATIONS, *LAWS, *KINEMATICS, *ELEMENTS, "CONS"])
+    if i >= 0 and isinstance(q.values[i], str) and not q.is_operator_word(i):
+        missing = next((w for w in ELSEWHERE if w[:4] == q.values[i][:4]), None)
+        if missing is None:
+            raise q.unknown_keyword([*FORMULATIONS, *LAWS, *KINEMATICS, "BARR", "CONS"])
+        ctx.places["word"] = q.nodes[i]
+        ctx.fail(
+            251,
+            "models with {word} are not available yet",
+            at="word",
+            word=missing,
+            hint="there are elastic solids, bars, and contact with or without friction",
+        )
     if "CONTACT" in words:
         return _contact_model(ctx, q, meshes, words)
     if "MECANIQUE" not in words:
