@@ -68,7 +68,7 @@ def _lisser(
         if not 1 <= ordre <= highest:
             ctx.fail(
                 41,
-                "the degree of the patches is {degree}: with these elements it goes from 1 to {highest}",
+                "the degree of the patches is {degree}: it is at least 1, and at most {highest} with these elements",
                 at="ordre",
                 degree=ordre,
                 highest=highest,

@@ -8,8 +8,8 @@ import numpy as np
 
 from gibiane_ops.kernels.topology import group_by_nodes
 from gibiane_ops.values.champs import INDETERMINE, ChamZone, ChPoint, MChaml, Part
-from gibiane_ops.values.modele import ModelZone
-from gibiane_ops.values.nodes import FloatArray
+from gibiane_ops.values.modele import ContactZone, ModelZone
+from gibiane_ops.values.nodes import FloatArray, IntArray
 
 SCAL, SCALAIRE = "SCAL", "SCALAIRE"
 Field = ChPoint | MChaml
@@ -46,7 +46,10 @@ def values_of(field: Field, names: Sequence[str] | None = None) -> FloatArray:
 
 
 def added(a: Field, b: Field, sign: float = 1.0) -> Field:
-    """Return a + sign b on the union of their supports; what one of them lacks counts as zero."""
+    """Return a + sign b on the union of their supports; what one of them lacks counts as zero.
+
+    Element fields of different models meet in the elements that these share.
+    """
     if isinstance(a, ChPoint) and isinstance(b, ChPoint):
         parts: dict[str, Part] = {}
         for name in dict.fromkeys([*a.names, *b.names]):
@@ -55,14 +58,55 @@ def added(a: Field, b: Field, sign: float = 1.0) -> Field:
         return ChPoint(a.store, parts, a.nature if a.nature == b.nature else INDETERMINE)
     if not (isinstance(a, MChaml) and isinstance(b, MChaml)):
         raise TypeError("added: two fields of one kind are wanted")
-    zones = []
-    for left in a.zones:
-        right = b.zone_of(left.zone)
-        zones.append(left if right is None else _sum_of_zones(left, right, sign, a, b))
+    zones = list(a.zones)
     for right in b.zones:
-        if a.zone_of(right.zone) is None:
-            zones.append(ChamZone(right.zone, right.names, sign * right.values))
+        zones = _with_zone(zones, right, sign, a, b)
     return MChaml(zones, a.subtype if a.subtype == b.subtype else SCALAIRE, _support(a, b))
+
+
+def _with_zone(zones: list[ChamZone], right: ChamZone, sign: float, a: MChaml, b: MChaml) -> list[ChamZone]:
+    """Return the zones of a, to which sign times a zone of b is added."""
+    same = next((i for i, left in enumerate(zones) if left.zone is right.zone), None)
+    if same is not None:
+        return [*zones[:same], _sum_of_zones(zones[same], right, sign, a, b), *zones[same + 1 :]]
+    rows = [_rows_in(left.zone, right.zone) for left in zones]
+    home = next((i for i, found in enumerate(rows) if (found >= 0).all()), None)
+    if home is not None:
+        return [*zones[:home], _sum_of_zones(zones[home], right, sign, a, b, rows[home]), *zones[home + 1 :]]
+    total = ChamZone(right.zone, right.names, sign * right.values)
+    result = []
+    for left, found in zip(zones, rows, strict=True):
+        if (found < 0).all():
+            result.append(left)
+        else:
+            # A part of the elements of the right zone: it takes the place of the left one.
+            total = _sum_of_zones(total, left, 1.0, b, a, _whole_rows(right.zone, left.zone))
+    return [*result, total]
+
+
+def _rows_in(zone: ModelZone | ContactZone, part: ModelZone | ContactZone) -> IntArray:
+    """Return where each element of a part stands in a zone, -1 for those that are not in it."""
+    if not (isinstance(zone, ModelZone) and isinstance(part, ModelZone)) or zone.shape != part.shape:
+        return np.full(1, -1)
+    m = len(zone.cells)
+    group, _ = group_by_nodes(np.concatenate([zone.cells, part.cells]))
+    row = np.full(int(group.max(initial=0)) + 1, -1, np.int64)
+    row[group[:m]] = np.arange(m)
+    return row[group[m:]]
+
+
+def _whole_rows(zone: ModelZone | ContactZone, part: ModelZone | ContactZone) -> IntArray:
+    """Return where the elements of a part stand in a zone, all of them."""
+    rows = _rows_in(zone, part)
+    if (rows < 0).any():
+        raise Incompatible(
+            182,
+            "the models of the two fields share {count} elements of {left} and {right}, but neither holds the other",
+            count=int((rows >= 0).sum()),
+            left=len(part.cells) if isinstance(part, ModelZone) else 0,
+            right=len(zone.cells) if isinstance(zone, ModelZone) else 0,
+        )
+    return rows
 
 
 def _nodes(field: ChPoint, name: str) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
@@ -70,13 +114,17 @@ def _nodes(field: ChPoint, name: str) -> np.ndarray[tuple[int], np.dtype[np.int6
     return part[0] if part is not None else np.zeros(0, np.int64)
 
 
-def _sum_of_zones(left: ChamZone, right: ChamZone, sign: float, a: MChaml, b: MChaml) -> ChamZone:
+def _sum_of_zones(
+    left: ChamZone, right: ChamZone, sign: float, a: MChaml, b: MChaml, rows: IntArray | slice = slice(None)
+) -> ChamZone:
+    """Return left + sign right, the elements of the right zone standing in the given rows of the left one."""
     check_supports(left, right, a, b)
     names = list(dict.fromkeys([*left.names, *right.names]))
     m, q = len(left.values), max(left.values.shape[1], right.values.shape[1])
     total = np.zeros((m, q, len(names)))
     total[..., [names.index(n) for n in left.names]] += left.values
-    total[..., [names.index(n) for n in right.names]] += sign * right.values
+    for column, name in enumerate(right.names):
+        total[rows, :, names.index(name)] += sign * right.values[..., column]
     return ChamZone(left.zone, names, total)
 
 
@@ -113,17 +161,33 @@ def combined(a: Field, b: Field, op: Binary) -> Field:
     if not (isinstance(a, MChaml) and isinstance(b, MChaml)):
         raise TypeError("combined: two fields of one kind are wanted")
     zones = []
-    for zone_a in a.zones:
-        zone_b = b.zone_of(zone_a.zone)
-        if zone_b is not None:
-            check_supports(zone_a, zone_b, a, b)
-            triples = _matched(zone_a.names, zone_b.names)
-            columns = [op(zone_a.component(left), zone_b.component(right)) for left, right, _ in triples]
-            zones.append(ChamZone(zone_a.zone, [name for *_, name in triples], np.stack(columns, axis=2)))
+    for zone_a, zone_b in _meetings(a, b):
+        check_supports(zone_a, zone_b, a, b)
+        triples = _matched(zone_a.names, zone_b.names)
+        columns = [op(zone_a.component(left), zone_b.component(right)) for left, right, _ in triples]
+        zones.append(ChamZone(zone_a.zone, [name for *_, name in triples], np.stack(columns, axis=2)))
     if not zones:
         raise Incompatible(182, "the two fields have no zone in common")
     subtype = a.subtype if len(b.names) == 1 and len(a.names) > 1 else b.subtype if len(a.names) == 1 else SCALAIRE
     return MChaml(zones, subtype, _support(a, b))
+
+
+def _meetings(a: MChaml, b: MChaml) -> list[tuple[ChamZone, ChamZone]]:
+    """Return the values of two fields on the zones where both stand: for a zone and a part of it, on the part."""
+    pairs = []
+    for left in a.zones:
+        same = b.zone_of(left.zone)
+        if same is not None:
+            pairs.append((left, same))
+            continue
+        for right in b.zones:
+            rows = _rows_in(left.zone, right.zone)
+            if (rows >= 0).all():
+                pairs.append((ChamZone(right.zone, left.names, left.values[rows]), right))
+            elif (rows >= 0).any():
+                inside = _whole_rows(right.zone, left.zone)
+                pairs.append((left, ChamZone(left.zone, right.names, right.values[inside])))
+    return pairs
 
 
 def _matched(left: Sequence[str], right: Sequence[str]) -> list[tuple[str, str, str]]:
@@ -189,12 +253,7 @@ def restricted(field: MChaml, zone: ModelZone) -> ChamZone | None:
     if own is not None:
         return own
     for other in field.zones:
-        if not isinstance(other.zone, ModelZone) or other.zone.shape != zone.shape:
-            continue
-        group, _ = group_by_nodes(np.concatenate([other.zone.cells, zone.cells]))
-        row = np.full(int(group.max(initial=0)) + 1, -1, np.int64)
-        row[group[: len(other.values)]] = np.arange(len(other.values))
-        found = row[group[len(other.values) :]]
+        found = _rows_in(other.zone, zone)
         if (found >= 0).all():
             return ChamZone(zone, other.names, other.values[found])
     return None
