@@ -253,7 +253,7 @@ def _function(
         topic="arithmetic",
         summary=summary,
         notice=f"{summary[0].upper()}{summary[1:]}, for a number, term by term for lists and fields.",
-        example=f"MESS ({name} 0.5) ;",
+        example=f"MESS ({name} {1.5 if name == 'ACOH' else 0.5}) ;",
     )
 
     @op.form(Arg("x", FLOTTANT, "number"), gives=[FLOTTANT])
