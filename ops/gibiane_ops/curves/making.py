@@ -88,9 +88,12 @@ def _manual(ctx: Context, q: Operands) -> Any:
 
 
 def _axis(q: Operands, what: str) -> tuple[str, AnyList]:
-    name = q.read(MOT) if q.values and isinstance(q.values[0], str) else None
-    values = q.need(LISTS, what)
-    return (name or "")[:NAME_LENGTH].rstrip(), values
+    words: list[str] = []
+    # A name may be followed by its variable, F(T): two words for the language.
+    while len(words) < 2 and q.values and isinstance(q.values[0], str):
+        words.append(q.need(MOT).rstrip())
+    name = words[0] + "".join(f"({variable})" for variable in words[1:]) if words else ""
+    return name[:NAME_LENGTH].rstrip(), q.need(LISTS, what)
 
 
 @EVOL.stream(

@@ -26,6 +26,15 @@ MANU = extend("MANUEL")
 
 
 @dataclass
+class _Alone:
+    """A value at one point of one element, zero elsewhere; numbers from 1."""
+
+    element: int
+    point: int
+    value: float
+
+
+@dataclass
 class _Given:
     """What was read: where, components with values, and words."""
 
@@ -53,6 +62,8 @@ def _read(ctx: Context, q: Operands, places: tuple[str, ...], options: tuple[str
             given.words[option[:4]] = str(q.need(MOT, f"'{option}'"))
         elif option == "REPA":
             given.words["REPA"] = "REPA"
+        elif option == "POSI":
+            given.words["support"] = q.need_keyword(SUPPORTS)
         elif option is not None:
             given.words["support"] = option
         elif given.count is not None and len(given.parts) >= given.count:
@@ -60,11 +71,20 @@ def _read(ctx: Context, q: Operands, places: tuple[str, ...], options: tuple[str
         else:
             ctx.places["name"] = q.nodes[i]
             name = str(q.need(MOT)).strip()
-            value = q.read((FLOTTANT, LISTREEL))
+            value = _alone(q) if "POSI" in options else None
+            if value is None:
+                value = q.read((FLOTTANT, LISTREEL))
             if value is None:
                 raise q.missing("FLOTTANT or LISTREEL", f"the component {name}")
             given.parts.append((name, value))
     return given
+
+
+def _alone(q: Operands) -> _Alone | None:
+    """Read the numbers of an element and of a point, and a value, when these three come next."""
+    if [type(v) for v in q.values[:2]] != [int, int] or len(q.values) < 3 or type(q.values[2]) not in (int, float):
+        return None
+    return _Alone(q.need(ENTIER), q.need(ENTIER), float(q.need(FLOTTANT)))
 
 
 def _place(ctx: Context, given: _Given, value: Any, node: Any) -> None:
@@ -168,14 +188,16 @@ def _distinct(ctx: Context, nodes: IntArray, values: FloatArray, nature: str) ->
     Key(("CHML", "CHAM"), "element field", name="what"),
     Key("TYPE", "sub-type", Arg("t", MOT)),
     Key("REPA", "one value per element", Arg("values", LISTREEL)),
+    Key("POSI", "word before the points"),
     Key(SUPPORTS, "points", name="support"),
-    syntax="'CHML' model:MMODEL|MAILLAGE name value ... ('REPA' name values:LISTREEL) ('TYPE' t) (support)",
+    syntax="'CHML' model:MMODEL|MAILLAGE name (element:ENTIER point:ENTIER) value ... "
+    "('REPA' name values:LISTREEL) ('TYPE' t) ('POSI') (support)",
     gives=[MCHAML],
 )
 def _manu_chml(ctx: Context, q: Operands) -> Any:
     if not (_starts_with(q, "CHML") or _starts_with(q, "CHAM")):
         return Refused
-    given = _read(ctx, q, (MMODEL, MAILLAGE), ("TYPE", "REPA", "TITR", *SUPPORTS))
+    given = _read(ctx, q, (MMODEL, MAILLAGE), ("TYPE", "REPA", "TITR", "POSI", *SUPPORTS))
     if given.where is None:
         raise q.missing(MMODEL, "the elements of the field")
     on_mesh = isinstance(given.where, Maillage)
@@ -190,7 +212,9 @@ def _manu_chml(ctx: Context, q: Operands) -> Any:
         m, n = len(zone.cells), len(support_points(shape(zone.shape), support))
         columns = []
         for name, value in parts:
-            if isinstance(value, ListReel):
+            if isinstance(value, _Alone):
+                columns.append(_one_value(ctx, value, start, (m, n), total))
+            elif isinstance(value, ListReel):
                 if len(value.values) != total:
                     ctx.fail(
                         212,
@@ -207,6 +231,17 @@ def _manu_chml(ctx: Context, q: Operands) -> Any:
         start += m
     names = [name for name, _ in parts]
     return MChaml(result, given.words.get("TYPE", "").strip() or _subtype(names), support, given.words.get("TITR", ""))
+
+
+def _one_value(ctx: Context, given: _Alone, start: int, size: tuple[int, int], total: int) -> FloatArray:
+    """Return the values of one zone, whose first element has the number `start` (from 0) in the model."""
+    for number, count in ((given.element, total), (given.point, size[1])):
+        if not 1 <= number <= count:
+            ctx.fail(1068, "there is no number {number}: this object has {size}", at="where", number=number, size=count)
+    values = np.zeros(size)
+    if start < given.element <= start + size[0]:
+        values[given.element - 1 - start, given.point - 1] = given.value
+    return values
 
 
 def _subtype(names: list[str]) -> str:

@@ -12,13 +12,13 @@ from gibiane.values import CHPOINT, MAILLAGE, MCHAML, MMODEL, MOT, POINT
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery import nodal_mean
-from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved
+from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
 from gibiane_ops.values.algebra import SCAL, SCALAIRE, restricted
-from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
+from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
 from gibiane_ops.values.maillage import Block, Maillage, Point
 from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
-from gibiane_ops.values.nodes import FloatArray, node_store
+from gibiane_ops.values.nodes import FloatArray, NodeStore, node_store
 
 CHAN = extend("CHANGER")
 TYPE = Arg("subtype", MOT, "sub-type of the result", optional=True)
@@ -28,12 +28,14 @@ TYPE = Arg("subtype", MOT, "sub-type of the result", optional=True)
     Key("CHPO", "a nodal field", required=True),
     Arg("model", MMODEL, "model"),
     Arg("field", MCHAML, "field"),
-    Key(("MOYE", "SOMM"), "mean of the elements (default), or their sum", name="how"),
+    Key(("MOYE", "SOMM", "SUPP"), "mean of the elements (default), their sum, or new points", name="how"),
     gives=[CHPOINT],
 )
 def _to_nodes(ctx: Context, chpo: bool, model: Modele, field: MChaml, how: str | None) -> ChPoint:
     store = node_store(ctx)
     zones = [(z, on_zone(ctx, field, z, "field")) for z in solid_zones(ctx, model)]
+    if how == "SUPP":
+        return _at_points(field, zones, store)
     parts = {}
     for name in field.names:
         having = [(z, v) for z, v in zones if name in v.names]
@@ -45,6 +47,21 @@ def _to_nodes(ctx: Context, chpo: bool, model: Modele, field: MChaml, how: str |
             mean = mean * np.bincount(np.concatenate([c.ravel() for c in cells]), minlength=len(nodes))
         parts[name] = (nodes, mean)
     return ChPoint(store, parts, DIFFUS, field.title)
+
+
+def _at_points(field: MChaml, zones: list[tuple[ModelZone, ChamZone]], store: NodeStore) -> ChPoint:
+    """Return the values of an element field at new points, one where each of its values is."""
+    parts: dict[str, list[Part]] = {name: [] for name in field.names}
+    for zone, values in zones:
+        of = shape(zone.shape)
+        places = geometry.positions(of, store.coords[zone.cells], support_points(of, field.support))
+        nodes = store.add(places.reshape(-1, 3))
+        for name in values.names:
+            parts[name].append((nodes, values.component(name).ravel()))
+    joined = {
+        n: (np.concatenate([p[0] for p in each]), np.concatenate([p[1] for p in each])) for n, each in parts.items()
+    }
+    return ChPoint(store, joined, DIFFUS, field.title)
 
 
 def _at_nodes(zone: ModelZone, values: FloatArray, field: MChaml) -> FloatArray:
