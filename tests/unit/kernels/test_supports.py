@@ -8,7 +8,7 @@ from gibiane_ops.kernels.elements.table import SHAPES, shape
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
 
-FILLED = [name for name, each in SHAPES.items() if each.dim >= 2 and each.degree == 1]
+FILLED = [name for name, each in SHAPES.items() if each.dim >= 2]
 
 
 def cell(name):
@@ -29,7 +29,19 @@ def test_a_linear_field_at_the_nodes_is_the_same_everywhere(name, target):
     np.testing.assert_allclose(moved(of, nodal, "NOEUD", target)[..., 0], expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["QUA4", "CUB8"])
+@pytest.mark.parametrize("name", FILLED)
+@pytest.mark.parametrize("source", ["RIGIDITE", "MASSE"])
+def test_a_linear_field_at_the_points_of_a_rule_reaches_every_node(name, source):
+    # One point tells a constant only.
+    of, X = cell(name)
+    here = support_points(of, source)
+    slope = np.array([1.0, -2.0, 0.5][: of.dim])
+    expected = X @ slope if len(here) > 1 else np.full((1, of.n_nodes), (X.mean(axis=1) @ slope)[0])
+    values = (geometry.positions(of, X, here) @ slope)[..., None]
+    np.testing.assert_allclose(moved(of, values, source, "NOEUD")[..., 0], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["QUA4", "CUB8", "TRI6", "TE10", "PR15"])
 def test_there_and_back_from_the_integration_points(name):
     of = shape(name)
     values = np.random.default_rng(1).normal(size=(1, len(of.gauss[1]), 2))
