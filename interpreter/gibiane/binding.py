@@ -419,6 +419,7 @@ def _explain_infix(name: str, q: Operands) -> GibianeError:
         q.point_at_word(failure)
         return GibianeError(failure)
     labels = [q.describe(0)] if q.values else []
-    hint = "a sign belongs to a number only: write -1 * X" if name in "+-" and labels else None
-    span = labels[0].span if labels else None
-    return GibianeError(make(533, "its operands are missing", labels=labels, span=span, hint=hint))
+    failure = make(533, "its operands are missing", labels=labels, span=labels[0].span if labels else None)
+    if name in "+-" and labels:
+        failure.hint = Text("a sign belongs to a number only: write -1 * X")
+    return GibianeError(failure)

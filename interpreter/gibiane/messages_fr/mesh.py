@@ -85,6 +85,7 @@ MESH = {
     "DALL can put its nodes on a sphere, a cylinder or a cone": "DALL peut mettre ses noeuds sur une sphère, un cylindre ou un cône",
     "an envelope of triangles is wanted, this mesh holds {shapes}": "il faut une enveloppe de triangles, ce maillage contient {shapes}",
     "this envelope holds quadrangles (QUA4); tetrahedra need triangles": "cette enveloppe contient des quadrangles (QUA4) ; il faut des triangles pour des tétraèdres",
+    "no way along these segments joins the two points": "aucun chemin de ces segments ne joint les deux points",
     "CHAN TRI3 cuts quadrangles in two; a surface is swept by VOLU N 'TRAN' V": "CHAN TRI3 coupe les quadrangles en deux ; une surface se translate par VOLU N 'TRAN' V",
     "{kind} elements cannot fill this boundary": "des éléments {kind} ne peuvent remplir ce bord",
     "triangles (TRI3) or quadrangles (QUA4) fill lines, tetrahedra (TET4) fill surfaces": "triangles (TRI3) ou quadrangles (QUA4) remplissent des lignes, tétraèdres (TET4) des surfaces",

@@ -13,8 +13,8 @@ from gibiane.registry import Context, Refused, operator
 from gibiane.values import ENTIER, FLOTTANT, LISTENTI, MAILLAGE, POINT
 from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import IntArray
-from gibiane_ops.kernels.mesh import locate, unions
-from gibiane_ops.mesh.building import DIMENSION, dimension, join, line_between, line_nodes, nodes_of
+from gibiane_ops.kernels.mesh import chains, locate, unions
+from gibiane_ops.mesh.building import DIMENSION, dimension, join, line_between, line_nodes, line_segments, nodes_of
 from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
 from gibiane_ops.mesh.merging import as_mesh
 from gibiane_ops.options import ELEMENTS
@@ -29,7 +29,7 @@ ELEM = operator(
     "`G ELEM COLOUR`: those of a colour (type and colour may be combined); `G ELEM N`: element N. "
     "`G ELEM 'CONT' P`: the element that contains a point ('TOUS': all that do). `G ELEM 'APPU' ('STRI'|"
     "'LARG') G2`: those with all their nodes in G2 (the default) or at least one. `L ELEM 'COMP' P1 P2`: "
-    "the part of a line from P1 to P2. `G ELEM 'TYPE'` and `G ELEM 'COUL'`: the LISTMOTS of the types and "
+    "the part of a line from P1 to P2; where lines branch, the way of fewest segments. `G ELEM 'TYPE'` and `G ELEM 'COUL'`: the LISTMOTS of the types and "
     "colours. An empty choice is an error unless 'NOVE' is given.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; "
     "G = S ELEM 'APPU' 'LARG' (COTE 1 S) ; MESS (NBEL G) ;",
@@ -95,6 +95,12 @@ def _containing(ctx: Context, g: Maillage, contenant: Point, tous: bool, noverif
 @ELEM.form(MESH, Key("COMPRIS", "part of a line", Arg("a", POINT), Arg("b", POINT), required=True), gives=[MAILLAGE])
 def _between(ctx: Context, g: Maillage, compris: tuple[Point, Point]) -> Maillage:
     quadratic, g = is_quadratic(g), linear_mesh(ctx, g)
+    segments = line_segments(ctx, g, "g")
+    if chains.branches(segments):
+        way = chains.path(segments, compris[0].node, compris[1].node)
+        if len(way) < 2:
+            ctx.fail(21, "no way along these segments joins the two points", at="compris")
+        return finished(ctx, line_between(ctx, way), quadratic)
     nodes = line_nodes(ctx, g, "g")
     closed = len(nodes) > 2 and nodes[0] == nodes[-1]
     places = []

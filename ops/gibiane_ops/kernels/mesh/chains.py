@@ -52,6 +52,49 @@ def segments_of(nodes: IntArray) -> IntArray:
     return np.stack([nodes[:-1], nodes[1:]], axis=1)
 
 
+def branches(segments: IntArray) -> bool:
+    """Say whether more than two segments meet at a node.
+
+    Parameters
+    ----------
+    segments : (m, 2) int64
+    """
+    return len(segments) > 0 and int(np.unique(segments, return_counts=True)[1].max()) > 2
+
+
+def path(segments: IntArray, first: int, last: int) -> IntArray:
+    """Find the way along segments from a node to another that takes the fewest segments.
+
+    Parameters
+    ----------
+    segments : (m, 2) int64
+        In any order and direction.
+    first, last : int
+        Nodes.
+
+    Returns
+    -------
+    (k,) int64
+        The nodes on the way, ends included; none when there is no way.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    nodes, ends = np.unique(segments, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    if not np.isin([first, last], nodes).all():
+        return np.zeros(0, np.int64)
+    start, goal = np.searchsorted(nodes, [first, last])
+    links = coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (len(nodes), len(nodes))).tocsr()
+    _, before = breadth_first_order(links, int(start), directed=False)
+    way = [int(goal)]
+    while way[-1] != start:
+        if before[way[-1]] < 0:
+            return np.zeros(0, np.int64)
+        way.append(int(before[way[-1]]))
+    return np.asarray(nodes[way[::-1]], np.int64)
+
+
 def walk(segments: IntArray) -> IntArray:
     """Order segments so that they follow one another, keeping their directions.
 
