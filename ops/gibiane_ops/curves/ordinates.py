@@ -63,13 +63,14 @@ def _powers(ctx: Context, base: Any, exponent: Any) -> FloatArray:
     return real_power(base, exponent)
 
 
-@extend("**").form(Arg("a", EVOLUTIO, "curves"), Arg("b", NUMBERS, "exponent"), gives=[EVOLUTIO])
-def _power(ctx: Context, a: Evolution, b: float) -> Evolution:
-    return _with_ordinates(ctx, a, lambda y: _powers(ctx, y, b))
-
-
-@extend("**").form(Arg("a", NUMBERS, "number"), Arg("b", EVOLUTIO, "exponents"), gives=[EVOLUTIO])
-def _power_of_number(ctx: Context, a: float, b: Evolution) -> Evolution:
+@extend("**").form(
+    Arg("a", (EVOLUTIO, *NUMBERS), "curves or number"), Arg("b", (EVOLUTIO, *NUMBERS), "exponent"), gives=[EVOLUTIO]
+)
+def _power(ctx: Context, a: Any, b: Any) -> Evolution:
+    if isinstance(a, Evolution) and isinstance(b, Evolution):
+        ctx.fail(21, "curves and a number are wanted", at="b")
+    if isinstance(a, Evolution):
+        return _with_ordinates(ctx, a, lambda y: _powers(ctx, y, b))
     return _with_ordinates(ctx, b, lambda y: _powers(ctx, a, y))
 
 

@@ -99,13 +99,20 @@ for _symbol in UFUNCS:
 
 
 @extend("**").form(
-    Arg("a", (CHPOINT, MCHAML), "field"), Arg("b", (ENTIER, FLOTTANT), "exponent"), gives=["CHPOINT|MCHAML"]
+    Arg("a", OPERAND, "field or number"), Arg("b", OPERAND, "exponent, field or number"), gives=["CHPOINT|MCHAML"]
 )
-def _power(ctx: Context, a: Field, b: Number) -> Field:
-    values = values_of(a)
-    if b < 0:
-        _refuse_zeros(ctx, a, "a")
-    negative = int(undefined(values, float(b)).sum())
+def _power(ctx: Context, a: Field | Number, b: Field | Number) -> Field:
+    if isinstance(a, ChPoint | MChaml) and isinstance(b, int | float):
+        _check_power(ctx, values_of(a), b)
+        return mapped(a, lambda v: real_power(v, b))
+    if isinstance(b, ChPoint | MChaml) and isinstance(a, int | float):
+        _check_power(ctx, a, values_of(b))
+        return mapped(b, lambda v: real_power(a, v))
+    ctx.fail(21, "a field and a number are wanted", at="b")
+
+
+def _check_power(ctx: Context, base: FloatArray | Number, exponent: FloatArray | Number) -> None:
+    negative = int(undefined(base, exponent).sum())
     if negative:
         ctx.fail(
             213,
@@ -114,19 +121,9 @@ def _power(ctx: Context, a: Field, b: Number) -> Field:
             count=negative,
             hint="whole powers and odd roots of it exist: ** 2, ** (1./3.)",
         )
-    return mapped(a, lambda v: real_power(v, float(b)))
-
-
-@extend("**").form(
-    Arg("a", (ENTIER, FLOTTANT), "number"), Arg("b", (CHPOINT, MCHAML), "exponents"), gives=["CHPOINT|MCHAML"]
-)
-def _power_of_number(ctx: Context, a: Number, b: Field) -> Field:
-    exponents = values_of(b)
-    if undefined(a, exponents).any():
-        ctx.fail(213, "a real power of a negative number ({a})", at="a", a=a)
-    if a == 0 and (exponents < 0).any():
+    zeros = int(np.sum((np.asarray(base) == 0) & (np.asarray(exponent) < 0)))
+    if zeros:
         ctx.fail(26, "zero to a negative power", at="a")
-    return mapped(b, lambda v: real_power(float(a), v))
 
 
 UNION = extend("ET")
