@@ -34,6 +34,8 @@ def leftover(ev: Runner, q: Operands, at: int, full: Operands | None = None) -> 
     if procedure is not None:
         failure.hint = Text("does {name} take so many arguments?", {"name": procedure.name})
         failure.forms = [procedures.usage(procedure)]
+    elif len(whole.values) > 1 and all(node is whole.nodes[0] for node in whole.nodes):
+        failure.hint = Text("it gives several results: A B = ... gives each a name")
     elif len(whole.values) > 1 and all(type_of(v) in (ENTIER, FLOTTANT) for v in whole.values):
         failure.hint = _numbers_hint(ev, whole)
     elif type_of(whole.values[0]) == POINT and all(type_of(v) in (ENTIER, FLOTTANT) for v in whole.values[1:]):

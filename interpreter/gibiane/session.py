@@ -231,6 +231,8 @@ class Session:
                 raise
             self.out.flush()
             self.err.write("interrupted; every object is kept\n")
+        except BrokenPipeError:
+            raise  # who read the output has closed it: no fault of the program
         except Exception as failure:
             self._internal(failure)
         finally:

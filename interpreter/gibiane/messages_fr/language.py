@@ -10,6 +10,7 @@ LANGUAGE = {
     "an operator is missing between them; for a point, OPTI DIME {count} ; comes first": "il manque un opérateur entre eux ; pour un point, OPTI DIME {count} ; vient d'abord",
     "a point has two coordinates after OPTI DIME 2, three after OPTI DIME 3": "un point a deux coordonnées après OPTI DIME 2, trois après OPTI DIME 3",
     "a sign belongs to a number only: write -1 * X": "un signe n'appartient qu'à un nombre : écrire -1 * X",
+    "it gives several results: A B = ... gives each a name": "il donne plusieurs résultats : A B = ... donne un nom à chacun",
     "an instruction cannot begin with {mark}": "une instruction ne peut pas commencer par {mark}",
     "a comment is a line with * in its first column; COMM 'text' ; may stand anywhere": "un commentaire est une ligne avec * en première colonne ; COMM 'texte' ; peut être partout",
     "its operands are missing": "ses opérandes manquent",

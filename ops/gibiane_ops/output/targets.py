@@ -27,6 +27,7 @@ COLOURS = {
     "CYAN": "#22b8cf",
     "OLIV": "#7a8a2a",
     "GRIS": "#9aa0a6",
+    "LIME": "#8bc34a",
 }
 """Colours of the language on paper."""
 

@@ -28,6 +28,7 @@ COLOURS = (
     "CYAN",
     "OLIV",
     "GRIS",
+    "LIME",
 )
 
 # Order in which scripts give and see the nodes of elements of second degree: corners and mid-nodes in turn, as in
