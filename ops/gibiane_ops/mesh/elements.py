@@ -29,7 +29,8 @@ ELEM = operator(
     "`G ELEM COLOUR`: those of a colour (type and colour may be combined); `G ELEM N`: element N. "
     "`G ELEM 'CONT' P`: the element that contains a point ('TOUS': all that do). `G ELEM 'APPU' ('STRI'|"
     "'LARG') G2`: those with all their nodes in G2 (the default) or at least one. `L ELEM 'COMP' P1 P2`: "
-    "the part of a line from P1 to P2; where lines branch, the way of fewest segments. `G ELEM 'TYPE'` and `G ELEM 'COUL'`: the LISTMOTS of the types and "
+    "the part of a line from P1 to P2; where lines branch, the way of fewest segments. "
+    "`G ELEM 'TYPE'` and `G ELEM 'COUL'`: the LISTMOTS of the types and "
     "colours. An empty choice is an error unless 'NOVE' is given.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; "
     "G = S ELEM 'APPU' 'LARG' (COTE 1 S) ; MESS (NBEL G) ;",
