@@ -180,7 +180,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     # operators of the language with further forms
     "ET": ("gibiane_ops.lists.access", "gibiane_ops.lists.objects", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
     "EXISTE": ("gibiane_ops.fields.components", "gibiane_ops.lists.sorting"),
-    "ERREUR": ("gibiane_ops.estimators", "gibiane_ops.truth", "gibiane_ops.error"),
+    "ERREUR": ("gibiane_ops.estimators", "gibiane_ops.contact_bound", "gibiane_ops.truth", "gibiane_ops.error"),
 }
 
 

@@ -10,12 +10,13 @@ from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, extend
 from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, type_of
-from gibiane_ops.kernels.estimate.combine import combine, facets_to_cells
+from gibiane_ops.kernels.estimate.combine import combine
 from gibiane_ops.kernels.estimate.contact import contact_error
 from gibiane_ops.kernels.estimate.zz import solid_error
-from gibiane_ops.values.algebra import SCAL, SCALAIRE, added, values_of
+from gibiane_ops.values.algebra import added, values_of
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import SolvedContact, solved_contacts
+from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, shared_out
 from gibiane_ops.values.estimates import (
     KIND,
     NORM,
@@ -26,12 +27,10 @@ from gibiane_ops.values.estimates import (
     field_of,
     results,
     stresses_of,
-    table_of,
 )
 from gibiane_ops.values.failures import worded
-from gibiane_ops.values.maillage import Block, Maillage
 from gibiane_ops.values.material import elastic_compliance
-from gibiane_ops.values.modele import Modele, ModelZone
+from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.smoothed import METHODS, Solid, smoothed
 
@@ -127,55 +126,17 @@ def _with_contact(
     variant: str | None,
     tabl: bool,
 ) -> Any:
-    if mc is None:
-        mc = model
-    elif model.contacts and not model.zones:
-        model, mc = mc, model
-    if not any(n in u.names for n in ("UX", "UY", "UZ")) and any(n in rea.names for n in ("UX", "UY", "UZ")):
-        u, rea = rea, u
-    fields = [("sig", sig), ("mat", mat), ("matc", matc), ("smooth", smooth)]
-    of_contact = next(
-        (
-            pair
-            for pair in fields
-            if pair[1] is not None and mc.contacts and pair[1].zone_of(mc.contacts[0]) is not None
-        ),
-        None,
-    )
-    if of_contact is None:
-        ctx.fail(
-            565,
-            "no material of the contact model among the operands",
-            at="matc",
-            hint="MATE MC 'MU' 0.2 makes it, with the same contact model",
-        )
-    rest: list[Any] = [field for pair in fields if pair is not of_contact and (field := pair[1]) is not None]
-    if len(rest) < 2:
-        raise ctx.operands.missing(MCHAML, "the stress and the material of the solids")
-    stress, material, smooth = stresses_of(ctx, rest[0], rest[1], rest[2] if len(rest) > 2 else None)
-    parts = _solid_part(ctx, model, stress, material, method or "SPR", smooth)
+    given = contact_operands(ctx, model, mc, u, rea, [("sig", sig), ("mat", mat), ("matc", matc), ("smooth", smooth)])
+    stress, material, smooth = stresses_of(ctx, *given.solid)
+    parts = _solid_part(ctx, given.model, stress, material, method or "SPR", smooth)
     blocks = [(z.shape, z.cells) for z in parts.zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
-    for state in solved_contacts(ctx, mc, of_contact[1], u, rea):
+    for state in solved_contacts(ctx, given.contact, given.law, given.u, given.reaction):
         found, on_facets = _contact_part(ctx, state, (variant or "DENSITE")[:4], parts.zones[0].mode)
         facets += on_facets
-        partner = np.full(node_store(ctx).count, -1, np.int64)
-        partner[state.pairs.pairs[:, 0]] = state.pairs.pairs[:, 1]
-        shared = facets_to_cells(blocks, state.zone.slave.kernel_blocks, found, partner)
-        totals = [a + b for a, b in zip(totals, shared, strict=True)]
-    result = combine(parts.errors, totals, "THES" if norm == "THESE" else "USUE")
-    columns = zip(result.solid_map, result.contact_map, result.total_map, strict=True)
-    zones = [
-        ChamZone(zone, ("SOLI", "CONT", "TOTA"), np.stack(column, axis=1)[:, None, :])
-        for zone, column in zip(parts.zones, columns, strict=True)
-    ]
-    field = MChaml(zones, SCALAIRE, "GRAVITE", "error")
-    if tabl:
-        table = table_of(result, parts, field, norm, SMOOTHED)
-        table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE", "error"))
-        return table
-    return result.solid, result.contact, result.total, field
+        totals = shared_out(ctx, state, blocks, found, totals)
+    return contact_results(ctx, parts, totals, norm, tabl, SMOOTHED, facets)
 
 
 def _contact_part(
@@ -197,13 +158,7 @@ def _contact_part(
             state.mu,
             variant,
         )
-    zones = []
-    for block, values in zip(slave.blocks, found.facet, strict=True):
-        surface = Maillage(store, [Block(block.shape, block.cells, block.colours)])
-        zones.append(
-            ChamZone(ModelZone(surface, "CONTACT", (state.zone.law,), mode), [SCAL], np.sqrt(values)[:, None, None])
-        )
-    return found.facet, zones
+    return found.facet, facet_zones(ctx, state, found.facet, mode)
 
 
 @ERRE.stream(syntax="'CONTACT'|... needs a model, a stress and a material")

@@ -79,7 +79,7 @@ def exterior(
     sides = []
     with worded(ctx, at="model"):
         boundary = topology.boundary([(z.shape, z.cells) for z in zones])
-    known, held = _held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
+    known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
     for name, facets in boundary.items():
         normal = geometry.facet_normals(shape(name), points[facets.nodes])
         value = np.zeros((len(facets.nodes), shape(name).n_nodes, dim))
@@ -110,6 +110,23 @@ def exterior(
     return sides
 
 
+def add_tractions(sides: Sequence[Side], name: str, nodes: IntArray, values: FloatArray) -> int:
+    """Add tractions, (k, n, d), at the nodes of facets of one shape, (k, n); return how many are on the boundary."""
+    found = 0
+    for side in sides:
+        if side.facets.name != name:
+            continue
+        group, _ = topology.group_by_nodes(np.vstack([side.facets.nodes, nodes]))
+        row = np.full(int(group.max(initial=0)) + 1, -1, np.int64)
+        row[group[: len(side.facets.nodes)]] = np.arange(len(side.facets.nodes))
+        target = row[group[len(side.facets.nodes) :]]
+        known = np.flatnonzero(target >= 0)
+        order = (nodes[known][:, None] == side.facets.nodes[target[known]][:, :, None]).argmax(axis=2)
+        side.traction[target[known]] += np.take_along_axis(values[known], order[:, :, None], axis=1)
+        found += len(known)
+    return found
+
+
 def _rows(facets: Facets, surface: Maillage, name: str) -> IntArray:
     """Return which boundary facets belong to a surface."""
     given = [block.cells for block in surface.blocks if block.shape == name]
@@ -119,7 +136,7 @@ def _rows(facets: Facets, surface: Maillage, name: str) -> IntArray:
     return np.flatnonzero(np.isin(group[: len(facets.nodes)], group[len(facets.nodes) :]))
 
 
-def _held_directions(
+def held_directions(
     store: NodeStore, supports: Rigidite | None, names: Sequence[str], dim: int
 ) -> tuple[IntArray, FloatArray]:
     """Return the nodes that equality conditions of their own hold, sorted, and the projectors on the directions held.
@@ -155,10 +172,15 @@ def _projectors(matrices: FloatArray, wanted: Any) -> FloatArray:
     return np.asarray(np.einsum("kiv,kv,kjv->kij", vectors, kept, vectors), np.float64)
 
 
-def _common(known: IntArray, projectors: FloatArray, nodes: IntArray) -> FloatArray:
-    """Return the projectors on the directions held at all the nodes of each facet, (k, d, d)."""
+def held_at(known: IntArray, projectors: FloatArray, nodes: IntArray) -> FloatArray:
+    """Return the projectors on the directions held at given nodes, (..., d, d), see `held_directions`."""
     padded = np.append(known, -1)
     place = np.searchsorted(known, nodes)
     found = np.where(padded[place] == nodes, place, len(known))
-    left = (np.eye(projectors.shape[1]) - projectors[found]).sum(axis=1)
+    return np.asarray(projectors[found], np.float64)
+
+
+def _common(known: IntArray, projectors: FloatArray, nodes: IntArray) -> FloatArray:
+    """Return the projectors on the directions held at all the nodes of each facet, (k, d, d)."""
+    left = (np.eye(projectors.shape[1]) - held_at(known, projectors, nodes)).sum(axis=1)
     return np.asarray(np.eye(left.shape[1]) - _projectors(left, np.ones(len(left), bool)), np.float64)

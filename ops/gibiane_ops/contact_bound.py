@@ -1,0 +1,152 @@
+"""ERREUR 'CONTACT' 'RDC': constitutive relation error with contact, guaranteed without friction or with Tresca's."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gibiane.forms import Arg, Key
+from gibiane.registry import Context, extend
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
+from gibiane_ops.kernels.estimate.contact_bound import ContactTractions, contact_tractions
+from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
+from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
+from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, partners, shared_out
+from gibiane_ops.values.equilibrated import ROUND_OFF, equilibrated, guarantee_of, parts_of
+from gibiane_ops.values.estimates import NORM, TABL, Guarantee, stresses_of
+from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior, held_at, held_directions
+from gibiane_ops.values.failures import worded
+from gibiane_ops.values.listes import ListReel
+from gibiane_ops.values.maillage import Point
+from gibiane_ops.values.material import solid_zones
+from gibiane_ops.values.modele import Modele
+from gibiane_ops.values.nodes import node_store
+from gibiane_ops.values.rigidite import Rigidite
+
+ERRE = extend("ERREUR")
+FLAT = 1e-6
+"""Largest angle between the normals of facets and nodes of a contact surface that counts as plane."""
+
+
+@ERRE.form(
+    Key("CONTACT", "with the contact part", required=True),
+    Key("RDC", "constitutive relation error", required=True),
+    Arg("model", MMODEL, "solids (TET4, or TRI3 in a plane)"),
+    Arg("sig", MCHAML, "stress"),
+    Arg("mat", MCHAML, "material"),
+    Arg("mc", MMODEL, "contact model", optional=True),
+    Arg("matc", MCHAML, "contact material"),
+    Arg("u", CHPOINT, "displacement"),
+    Arg("rea", CHPOINT, "contact forces (REAC)"),
+    *LOADS,
+    Key("BALAYAGES", "improvements around each node (2)", Arg("n", ENTIER), name="sweeps"),
+    NORM,
+    TABL,
+    gives=[FLOTTANT, FLOTTANT, FLOTTANT, MCHAML],
+)
+def _bound_with_contact(
+    ctx: Context,
+    contact: bool,
+    rdc: bool,
+    model: Modele,
+    sig: MChaml,
+    mat: MChaml,
+    mc: Modele | None,
+    matc: MChaml,
+    u: ChPoint,
+    rea: ChPoint,
+    cl: Rigidite | None,
+    pres: list[Any],
+    fsur: list[Any],
+    volu: Point | None,
+    sweeps: int | None,
+    norm: str | None,
+    tabl: bool,
+) -> Any:
+    given = contact_operands(ctx, model, mc, u, rea, [("sig", sig), ("mat", mat), ("matc", matc)])
+    stress, material, _ = stresses_of(ctx, *given.solid)
+    zones = solid_zones(ctx, given.model)
+    sides = exterior(ctx, zones, cl, pres, fsur)
+    blocks = [(z.shape, z.cells) for z in zones]
+    totals = [np.zeros(len(cells)) for _, cells in blocks]
+    facets: list[ChamZone] = []
+    doubts: list[str] = []
+    for state in solved_contacts(ctx, given.contact, given.law, given.u, given.reaction):
+        found = _tractions(ctx, state, given.law, sides, cl)
+        doubts += _doubts(state, found)
+        # The identity of Prager and Synge holds with twice the contact part.
+        totals = shared_out(ctx, state, blocks, [2 * found.facet], totals)
+        facets += facet_zones(ctx, state, [2 * found.facet], zones[0].mode)
+    solid = equilibrated(ctx, zones, stress, material, sides, volu, sweeps)
+    guarantee = guarantee_of(ctx, solid)
+    if doubts:
+        reason = "not guaranteed (" + "; ".join(dict.fromkeys(doubts)) + ")"
+        ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason)
+        guarantee = Guarantee(False, reason)
+    more = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
+    return contact_results(ctx, parts_of(zones, solid), totals, norm, tabl, guarantee, facets, more)
+
+
+def _tractions(
+    ctx: Context, state: SolvedContact, law: MChaml, sides: list[Side], supports: Rigidite | None
+) -> ContactTractions:
+    """Find the contact tractions of a zone and put them on both of its surfaces."""
+    store, dim = node_store(ctx), state.frames.shape[1]
+    name = "TRI3" if dim == 3 else "SEG2"
+    block = state.zone.slave.blocks[0]
+    if any(b.shape != name for b in state.zone.slave.blocks):
+        ctx.fail(
+            251,
+            "contact tractions in balance are built on {wanted} only",
+            at="mc",
+            wanted=name,
+            hint="the contact surfaces of solids in tetrahedra are triangles",
+        )
+    slave, master = state.pairs.pairs.T
+    known = held_directions(store, supports, DISPLACEMENT[:dim], dim)
+    # A support holds an axis of both nodes of a pair; an obstacle (-1) needs no balance of its own.
+    sure = np.diagonal(held_at(*known, slave), axis1=1, axis2=2) > 1 - ROUND_OFF
+    sure &= (np.diagonal(held_at(*known, master), axis1=1, axis2=2) > 1 - ROUND_OFF) | (master < 0)[:, None]
+    values = law.zone_of(state.zone)
+    threshold = nodal_property(ctx, values, "SEUI", slave) if state.zone.law == "TRESCA" else None
+    with worded(ctx, at="mc"):
+        found = contact_tractions(
+            store.coords[:, :dim],
+            block.cells,
+            slave,
+            state.frames,
+            state.force,
+            state.relative,
+            state.gap,
+            np.zeros(len(slave)) if state.zone.law == "TRESCA" else state.mu,
+            np.zeros(len(slave)) if threshold is None else threshold,
+            sure,
+        )
+    lost = len(block.cells) - add_tractions(sides, name, block.cells, found.traction)
+    facing = partners(ctx, state)[block.cells]
+    both = (facing >= 0).all(axis=1)
+    lost += int(both.sum()) - add_tractions(sides, name, facing[both], -found.traction[both])
+    if lost:
+        ctx.fail(
+            251,
+            "{count} contact facets have no facet of a solid with the same nodes: tractions cannot be opposite there",
+            at="mc",
+            count=lost,
+            hint="mesh the contact surface once, copy it for the other solid, and cut both alike",
+        )
+    return found
+
+
+def _doubts(state: SolvedContact, found: ContactTractions) -> list[str]:
+    """Say what keeps the contact of a zone from being part of a bound."""
+    doubts = []
+    if state.zone.law not in ("UNILATERAL", "TRESCA") and (state.mu > 0).any():
+        doubts.append("Coulomb" if state.zone.law == "COULOMB" else f"friction law {state.zone.law}")
+    if not found.admissible:
+        doubts.append(f"no contact tractions in balance obey the law: it is left by {found.violation:.2g}")
+    if found.flatness > FLAT:
+        doubts.append("the contact surface is not plane")
+    if len(state.pairs.unpaired_slave):
+        doubts.append("nodes of the contact surface have no partner")
+    return doubts
