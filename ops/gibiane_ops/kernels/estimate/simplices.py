@@ -64,11 +64,6 @@ class Simplices:
         """Sides of one cell only."""
         return np.flatnonzero(self.cell[:, 1] < 0)
 
-    def levers(self) -> FloatArray:
-        """Return the corners of the sides of each cell relative to its centroid, (m, d + 1, d, d)."""
-        X = self.points[self.cells]
-        return np.asarray((X - X.mean(axis=1, keepdims=True))[:, others(self.dim)], np.float64)
-
 
 def others(dim: int) -> IntArray:
     """Return the corners of each side of a simplex, (dim + 1, dim), increasing."""

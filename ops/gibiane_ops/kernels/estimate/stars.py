@@ -20,12 +20,6 @@ CHUNK = 64
 """Stars that are assembled together."""
 
 
-def tractions_of(mesh: Simplices, stress: FloatArray) -> FloatArray:
-    """Return the tractions of uniform stresses, times measures, (m, d + 1, d, d): side, corner, component."""
-    flux = np.einsum("mkis,ms->mki", contraction(mesh.outward, mesh.dim), stress)
-    return np.repeat(flux[:, :, None], mesh.dim, axis=2)
-
-
 def jumps(mesh: Simplices, tau: FloatArray, stress: FloatArray, cells: IntArray | slice = slice(None)) -> FloatArray:
     """Subtract the tractions of the finite-element stress from the balanced ones, on each side of each cell.
 
