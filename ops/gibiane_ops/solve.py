@@ -179,7 +179,7 @@ def _reac(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
         slave, master = store.canonical(np.maximum(contact.pairs.pairs, 0)).T
         solid = contact.pairs.pairs[:, 1] >= 0
         for axis in "XYZ"[: contact.pairs.normals.shape[1]]:
-            force = u.at("LF" + axis, contact.multipliers)
+            force = u.at("LX", contact.vectors[:, "XYZ".index(axis)])
             terms.setdefault("F" + axis, []).extend([(slave, force), (master[solid], -force[solid])])
     parts = {}
     for name, pieces in terms.items():

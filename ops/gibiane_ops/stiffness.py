@@ -70,8 +70,10 @@ def _contact(ctx: Context, model: Modele, material: MChaml | None) -> Any:
         nodes = pairs.pairs[:, 0]
         gap = nodal_property(ctx, values, "JEU", nodes)
         multipliers = store.add(pairs.points)
+        d = pairs.normals.shape[1]
+        vectors = store.add(np.repeat(pairs.points, d, axis=0)).reshape(-1, d)
         with worded(ctx, at="material"):
-            parts.append(ContactPart(zone, pairs, zone_friction(ctx, zone, values, nodes), multipliers))
+            parts.append(ContactPart(zone, pairs, zone_friction(ctx, zone, values, nodes), multipliers, vectors))
         gaps.append((multipliers, pairs.gap if gap is None else gap))
     nodes = np.concatenate([n for n, _ in gaps])
     values_of_gaps = np.concatenate([g for _, g in gaps])

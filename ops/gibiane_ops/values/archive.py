@@ -33,7 +33,7 @@ NODES = {
     "Block": ("cells",),
     "MatrixPart": ("nodes",),
     "ConditionPart": ("node", "multipliers"),
-    "ContactPart": ("multipliers",),
+    "ContactPart": ("multipliers", "vectors"),
     "ContactPairs": ("pairs", "unpaired_slave", "unpaired_master"),
 }
 # Language objects rebuilt from their text.

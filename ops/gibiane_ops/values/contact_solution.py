@@ -30,8 +30,6 @@ from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.solving import check_held, kept, tell_notes
 from gibiane_ops.values.system import System
 
-FORCES = ("LFX", "LFY", "LFZ")
-
 
 @dataclass(frozen=True, eq=False)
 class Wishes:
@@ -194,14 +192,19 @@ def _relative(system: System, interface: Interface, pairs: IntArray, u: ChPoint)
     return np.where(interface.active, w, 0.0)
 
 
+def _force_nodes(system: System) -> IntArray:
+    """Return the nodes that carry the contact forces, one per pair and axis, (n_pairs, d)."""
+    return np.concatenate([np.zeros((0, system.dim), np.int64), *(part.vectors for part in system.contacts)])
+
+
 def _forces(system: System, interface: Interface, u: ChPoint) -> FloatArray | None:
     """Return the contact forces that a solution holds, in local axes; None when it is of other conditions."""
-    nodes = np.concatenate([np.zeros(0, np.int64), *(part.multipliers for part in system.contacts)])
-    names = FORCES[: system.dim]
-    if not all(name in u.names and np.isin(nodes, u.parts[name][0]).all() for name in names):
+    nodes = _force_nodes(system)
+    if "LX" not in u.names or not np.isin(nodes, u.parts["LX"][0]).all():
         return None
     r = np.zeros(interface.active.shape)
-    r[: len(nodes)] = np.einsum("nij,nj->ni", interface.frames[: len(nodes)], u.table(names, nodes))
+    vector = u.at("LX", nodes.ravel()).reshape(nodes.shape)
+    r[: len(nodes)] = np.einsum("nij,nj->ni", interface.frames[: len(nodes)], vector)
     r[len(nodes) :, 0] = system.stop_signs * u.at("LX", system.stop_multipliers)
     return r
 
@@ -270,15 +273,13 @@ def _check_normals(ctx: Context, k: Rigidite, system: System) -> None:
 def _with_contact_forces(
     system: System, u: ChPoint, state: ContactState, vector: FloatArray, on_stops: FloatArray
 ) -> ChPoint:
-    nodes = np.concatenate([np.zeros(0, np.int64), *(part.multipliers for part in system.contacts)])
+    normal = np.concatenate([np.zeros(0, np.int64), *(part.multipliers for part in system.contacts)])
     parts = dict(u.parts)
     own, values = parts.get("LX", (np.zeros(0, np.int64), np.zeros(0)))
     parts["LX"] = (
-        np.concatenate([own, nodes, system.stop_multipliers]),
-        np.concatenate([values, state.r[: len(nodes), 0], system.stop_signs * on_stops]),
+        np.concatenate([own, normal, _force_nodes(system).ravel(), system.stop_multipliers]),
+        np.concatenate([values, state.r[: len(normal), 0], vector.ravel(), system.stop_signs * on_stops]),
     )
-    if len(nodes):
-        parts |= {name: (nodes, vector[:, i]) for i, name in enumerate(FORCES[: system.dim])}
     return ChPoint(system.store, parts, u.nature)
 
 

@@ -94,13 +94,19 @@ class ContactPart:
     law : Friction
         Friction of the pairs, in nodal forces.
     multipliers : (n_pairs,) int64
+        One node of the session per pair: carries its gap (FLX) and the normal force found (LX).
+    vectors : (n_pairs, d) int64
+        One node per pair and axis: carries the contact force on the slave along this axis (LX).
     """
 
-    def __init__(self, zone: ContactZone, pairs: ContactPairs, law: Friction, multipliers: IntArray) -> None:
+    def __init__(
+        self, zone: ContactZone, pairs: ContactPairs, law: Friction, multipliers: IntArray, vectors: IntArray
+    ) -> None:
         self.zone = zone
         self.pairs = pairs
         self.law = law
         self.multipliers = multipliers
+        self.vectors = vectors
 
 
 Part = MatrixPart | ConditionPart | ContactPart
