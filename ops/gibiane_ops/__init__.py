@@ -91,8 +91,18 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "BORNER": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.sums", "gibiane_ops.curves.ordinates"),
     "DIMENSION": ("gibiane_ops.lists.access", "gibiane_ops.lists.objects", "gibiane_ops.curves.ordinates"),
     "COPIER": ("gibiane_ops.lists.access", "gibiane_ops.lists.objects"),
-    "+": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.vectors"),
-    "-": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.vectors"),
+    "+": (
+        "gibiane_ops.lists.mathematics",
+        "gibiane_ops.fields.arithmetic",
+        "gibiane_ops.curves.ordinates",
+        "gibiane_ops.mesh.vectors",
+    ),
+    "-": (
+        "gibiane_ops.lists.mathematics",
+        "gibiane_ops.fields.arithmetic",
+        "gibiane_ops.curves.ordinates",
+        "gibiane_ops.mesh.vectors",
+    ),
     "*": (
         "gibiane_ops.lists.mathematics",
         "gibiane_ops.fields.arithmetic",
@@ -100,7 +110,12 @@ OPERATORS: dict[str, tuple[str, ...]] = {
         "gibiane_ops.mesh.vectors",
         "gibiane_ops.masses",
     ),
-    "/": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.vectors"),
+    "/": (
+        "gibiane_ops.lists.mathematics",
+        "gibiane_ops.fields.arithmetic",
+        "gibiane_ops.curves.ordinates",
+        "gibiane_ops.mesh.vectors",
+    ),
     "**": ("gibiane_ops.lists.mathematics", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates"),
     "<": ("gibiane_ops.lists.mathematics",),
     ">": ("gibiane_ops.lists.mathematics",),
@@ -178,7 +193,15 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "TRACER": ("gibiane_ops.output.trace",),
     "DESSIN": ("gibiane_ops.output.draw",),
     # operators of the language with further forms
-    "ET": ("gibiane_ops.lists.access", "gibiane_ops.lists.objects", "gibiane_ops.stiffness", "gibiane_ops.fields.arithmetic", "gibiane_ops.curves.ordinates", "gibiane_ops.mesh.merging", "gibiane_ops.output.shapes"),
+    "ET": (
+        "gibiane_ops.lists.access",
+        "gibiane_ops.lists.objects",
+        "gibiane_ops.stiffness",
+        "gibiane_ops.fields.arithmetic",
+        "gibiane_ops.curves.ordinates",
+        "gibiane_ops.mesh.merging",
+        "gibiane_ops.output.shapes",
+    ),
     "EXISTE": ("gibiane_ops.fields.components", "gibiane_ops.lists.sorting"),
     "ERREUR": ("gibiane_ops.estimators", "gibiane_ops.contact_bound", "gibiane_ops.truth", "gibiane_ops.error"),
 }
@@ -187,7 +210,6 @@ OPERATORS: dict[str, tuple[str, ...]] = {
 def setup(session: Any) -> None:
     """Announce the operators to the registry and prepare a session for them."""
     from gibiane.registry import announce
-
     from gibiane_ops.options import prepare
 
     announce(OPERATORS)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, MCHAML, MMODEL
-
 from gibiane_ops.kernels.estimate.contact import densities
 from gibiane_ops.values.champs import DIFFUS, ChPoint, MChaml
 from gibiane_ops.values.contact import solved_contacts

@@ -33,7 +33,8 @@ RULES = {
 }
 # Cells per side of the unit box, coarse and fine.
 SIZES = {"TRI3": (6, 12), "QUA4": (6, 12), "TRI6": (3, 6), "QUA8": (3, 6)} | {
-    "TET4": (4, 8), "PYR5": (3, 6), "PRI6": (4, 8), "CUB8": (4, 8), "TE10": (2, 4), "PY13": (2, 4), "PR15": (2, 4), "CU20": (2, 4)
+    "TET4": (4, 8), "PYR5": (3, 6), "PRI6": (4, 8), "CUB8": (4, 8),
+    "TE10": (2, 4), "PY13": (2, 4), "PR15": (2, 4), "CU20": (2, 4)
 }  # fmt: skip
 AMPLITUDE = np.array([1.0, -0.6, 0.8])
 WAVE = np.array([1.7, 1.1, -0.9])

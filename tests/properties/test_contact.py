@@ -66,7 +66,9 @@ def test_solution_obeys_every_law(seed, n, dim, mu, with_gap):
     assert in_cone(state.r, np.full(n, mu), 1e-8).all()
     assert (state.w[:, 0] <= gap + 1e-8).all()
     np.testing.assert_allclose(S @ state.w.ravel(), interface.f + state.r.ravel(), atol=1e-8)
-    power = friction_bound(state.r[:, 0], state.law.mu) * norms(state.w[:, 1:]) + np.einsum("ni,ni->n", state.r, state.w)
+    power = friction_bound(state.r[:, 0], state.law.mu) * norms(state.w[:, 1:]) + np.einsum(
+        "ni,ni->n", state.r, state.w
+    )
     np.testing.assert_allclose(power - state.r[:, 0] * gap, 0, atol=1e-7)
     assert report.dissipation >= -1e-9
     assert report.n_open + report.n_stick + report.n_slip == n

@@ -334,5 +334,6 @@ def _fail(ctx: Context, failure: Any, reason: str, method: Method) -> NoReturn:
         reason=reason,
         hint="'RAPP' T keeps the history, 'SOUC' gives the best iterate"
         if method.name == "NEWT"
-        else "the default method 'NEWT' needs no parameter; 'RAPP' T keeps the history, 'ITMA' n allows more iterations",
+        else "the default method 'NEWT' needs no parameter; 'RAPP' T keeps the history, "
+        "'ITMA' n allows more iterations",
     )

@@ -62,7 +62,8 @@ def test_folder_and_binary_file_are_no_scripts(tmp_path: Path, capsys: Captured)
 
 
 @pytest.mark.parametrize("arguments", [
-    ["--nonsense"], ["-x"], ["-c"], ["-i"], ["check"], ["info"], ["--echo", "9"], ["--lang", "de"], ["-c", "MESS 1 ;", "1=2"],
+    ["--nonsense"], ["-x"], ["-c"], ["-i"], ["check"], ["info"], ["--echo", "9"], ["--lang", "de"],
+    ["-c", "MESS 1 ;", "1=2"],
 ])  # fmt: skip
 def test_wrong_command_lines(arguments: list[str], capsys: Captured) -> None:
     assert main(arguments) == 2

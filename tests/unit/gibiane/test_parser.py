@@ -24,6 +24,9 @@ def test_table_and_grammar_parse_alike() -> None:
     def shown(value: object) -> object:
         if isinstance(value, list | tuple):
             return [shown(v) for v in value]
-        return [type(value).__name__, *(shown(getattr(value, s)) for s in getattr(value, "__slots__", ()) if s != "code")]
+        return [
+            type(value).__name__,
+            *(shown(getattr(value, s)) for s in getattr(value, "__slots__", ()) if s != "code"),
+        ]
 
     assert shown(parser.parser().parse(tokens)) == shown(parser.built().parse(tokens))
