@@ -424,6 +424,8 @@ def _same_line(instr: Instr, held: list[Token], habits: Habits) -> Diagnostic | 
         elif word in ALONE:
             hit = not rest
         elif word in ("LIST", "ERRE", "ERREUR", "TRAC"):
+            if token.type == "STRING":
+                continue  # more likely a keyword: TAILLE 'ERREUR' ...
             acts = equals is not None or (first in DIRECTIVES and word[:4] not in _KEYWORDS_OF.get(first[:4], ()))
             hit = acts and bool(rest) and first[:4] != "VALE"
         else:
