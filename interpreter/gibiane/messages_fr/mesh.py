@@ -114,6 +114,9 @@ MESH = {
     "this mesh has no contour: it holds {shapes}": "ce maillage n'a pas de contour : il contient {shapes}",
     "a closed surface has none, and ENVE gives the boundary of a volume; 'NOID' accepts an empty result": "une surface fermée n'en a pas, et ENVE donne le bord d'un volume ; 'NOID' accepte un résultat vide",
     # merging, remeshing
+    "elements are of degree 1 or 2, not {degree}": "les éléments sont de degré 1 ou 2, non {degree}",
+    "a part of the boundary cannot be kept alone: {given} of its {total} facets are given": "une partie du bord ne peut être gardée seule : {given} de ses {total} facettes sont données",
+    "ENVE (in the plane CONT) gives the whole boundary": "ENVE (dans le plan CONT) donne tout le bord",
     "a DIFFUS field has different values of {name} at two nodes that would become one: they differ by {gap}": "un champ DIFFUS a des valeurs de {name} différentes à deux noeuds à confondre : elles diffèrent de {gap}",
     "a field without nature has values ({name}) at two nodes that would become one": "un champ sans nature a des valeurs ({name}) à deux noeuds à confondre",
     "give it a nature: 'NATU' 'DIFFUS' or 'DISCRET'": "lui donner une nature : 'NATU' 'DIFFUS' ou 'DISCRET'",

@@ -62,6 +62,13 @@ def finished(ctx: Context, mesh: Maillage, quadratic: bool) -> Maillage:
     return quadratic_mesh(ctx, mesh) if quadratic else mesh
 
 
+def checked_degree(ctx: Context, degree: int) -> int:
+    """Return a degree of elements that a script gives: 1 or 2 (error 42)."""
+    if degree not in (1, 2):
+        ctx.fail(42, "elements are of degree 1 or 2, not {degree}", at="ordre", degree=degree)
+    return degree
+
+
 def every_node(ctx: Context, nodes: IntArray) -> IntArray:
     """Put the mid-nodes between the corners of a line, (m + 1,) to (2 m + 1,)."""
     result = np.empty(2 * len(nodes) - 1, np.int64)

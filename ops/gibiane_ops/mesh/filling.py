@@ -8,11 +8,11 @@ import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
-from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, POINT
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE, POINT
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import edges
 from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, surface_shape
-from gibiane_ops.mesh.degree import finished, linear_mesh, wants_quadratic
+from gibiane_ops.mesh.degree import LINEAR, checked_degree, finished, linear_mesh, wants_quadratic
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.maillage import Maillage
 
@@ -234,9 +234,11 @@ MAILLER = operator(
     notice="`M = MAILLER ENV (size)` fills a closed surface of triangles with tetrahedra; closed lines in the "
     "same plane are filled with triangles, or with quadrangles if 'ELEM' QUA4 asks for them. The "
     "boundary is kept as it is, node for node; closed parts inside the largest are cavities. The size "
-    "inside follows the boundary, a FLOTTANT, or a CHPOINT on the boundary. The same data give the "
-    "same mesh. Two bodies that touch: make the common face once, and use it and its copy "
-    "`F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then pair exactly. "
+    "inside follows the boundary, a FLOTTANT, or a CHPOINT on the boundary; where the boundary "
+    "is much coarser, elements grow towards it. 'ORDRE' 2 gives mid-nodes, on the boundary those of its elements or of "
+    "its geometry; so does OPTI ELEM of second degree. The same data give the same mesh. Two bodies that touch: make "
+    "the common face once, and use it and its copy `F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then "
+    "pair exactly. "
     "`M T = MAILLER 'PAVE' P1 P2 size` meshes a box; 'CYLI' P1 P2 r a cylinder, 'SPHE' C r a ball, 'DEMI' C r V "
     "the half of a ball on the side of V (in the plane: rectangle, disc, half disc); 'UNION' or 'MOINS' and another "
     "solid may follow. `M T = MAILLER 'FICH' name (size)` reads a geometry or a mesh of gmsh, STEP or BREP. "
@@ -251,11 +253,13 @@ MAILLER = operator(
     Arg("g", MAILLAGE, "closed envelope, or closed lines"),
     SIZE,
     Key("ELEM", "type of the elements", Arg("kind", "MOT")),
+    Key("ORDRE", "degree of the elements", Arg("n", ENTIER)),
     gives=[MAILLAGE],
 )
-def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None) -> Maillage:
+def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None, ordre: int | None) -> Maillage:
     flat = max((DIMENSION[name] for name in g.shapes), default=0) == 1
-    kind = elem[:4] if elem is not None else ("TRI3" if flat else "TET4")
+    given = elem[:4] if elem is not None else ("TRI3" if flat else "TET4")
+    kind = LINEAR.get(given, given)
     if kind not in (("TRI3", "QUA4") if flat else ("TET4",)):
         ctx.fail(
             19,
@@ -264,6 +268,9 @@ def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None) -> Maillag
             kind=kind,
             hint="triangles (TRI3) or quadrangles (QUA4) fill lines, tetrahedra (TET4) fill surfaces",
         )
+    degree = checked_degree(ctx, ordre) if ordre is not None else 2 if kind != given or wants_quadratic(ctx, g) else 1
     if flat:
-        return fill_contour(ctx, contour_of(ctx, g, "g"), size, kind == "QUA4", "g")
-    return fill_envelope(ctx, _envelope(ctx, g, "g"), size, "g")
+        filled = fill_contour(ctx, contour_of(ctx, g, "g"), size, kind == "QUA4", "g")
+    else:
+        filled = fill_envelope(ctx, _envelope(ctx, g, "g"), size, "g")
+    return finished(ctx, filled, degree == 2)

@@ -10,9 +10,11 @@ import numpy as np
 from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, extend
-from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MOT, POINT, TABLE, Table
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE, MOT, POINT, TABLE, Table
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
+from gibiane_ops.mesh.degree import checked_degree, finished, wants_quadratic
 from gibiane_ops.values.maillage import Maillage
+from gibiane_ops.values.middles import middles_of
 
 SIMPLEX = {2: "SEG2", 3: "TRI3", 4: "TET4"}
 # How many points each solid wants, and whether a radius follows.
@@ -28,7 +30,9 @@ P1, P2, C, N, R = Arg("p1", POINT), Arg("p2", POINT), Arg("c", POINT), Arg("v", 
     Key("FICH", "file of gmsh, STEP or BREP", Arg("name", MOT)),
     Key("UNION", "join the next solid"),
     Key("MOINS", "take the next solid away"),
-    syntax="'PAVE' p1 p2 | 'CYLI' p1 p2 r | 'SPHE' c r | 'DEMI' c r v | 'FICH' name ('UNION'|'MOINS' solid)... (size)",
+    Key("ORDRE", "degree of the elements", Arg("n", ENTIER)),
+    syntax="'PAVE' p1 p2 | 'CYLI' p1 p2 r | 'SPHE' c r | 'DEMI' c r v | 'FICH' name ('UNION'|'MOINS' solid)... (size) "
+    "('ORDRE' n)",
     gives=[MAILLAGE, TABLE],
 )
 def _solid(ctx: Context, q: Operands) -> Any:
@@ -44,9 +48,10 @@ def _solid(ctx: Context, q: Operands) -> Any:
     name = q.read_keyword(["FICH"])
     if name is not None:
         path = _path(ctx, q)
+        size, degree = _size(ctx, q, size), _degree(ctx, q)
         size = _size(ctx, q, size)
         with explained(ctx):
-            return _results(ctx, mesh_file(path, size, dim))
+            return _results(ctx, mesh_file(path, size, dim, degree))
     solids = []
     how: str | None = "UNION"
     while how is not None:
@@ -56,6 +61,7 @@ def _solid(ctx: Context, q: Operands) -> Any:
         radius = float(q.need(FLOTTANT, "the radius")) if round_ else 0.0
         solids.append(Solid(kind, points, radius, how))
         how = q.read_keyword(["UNION", "MOINS"])
+    size, degree = _size(ctx, q, size), _degree(ctx, q)
     size = _size(ctx, q, size)
     if size is None:
         size = float(ctx.option("DENS"))
@@ -64,7 +70,13 @@ def _solid(ctx: Context, q: Operands) -> Any:
                 809, "no size is given and the density is 0", hint="end with the size of the elements, or set DENS"
             )
     with explained(ctx):
-        return _results(ctx, mesh_solid(solids, size, dim))
+        return _results(ctx, mesh_solid(solids, size, dim, degree))
+
+
+def _degree(ctx: Context, q: Operands) -> int:
+    if q.read_keyword(["ORDRE"]) is None:
+        return 2 if wants_quadratic(ctx) else 1
+    return checked_degree(ctx, q.need(ENTIER, "the degree"))
 
 
 def _size(ctx: Context, q: Operands, given: float | None) -> float | None:
@@ -91,9 +103,12 @@ def _results(ctx: Context, solid: Any) -> tuple[Maillage, Table]:
     """Return the mesh, and the table of its faces and named groups."""
     store = nodes_of(ctx)
     ids = store.add(solid.points, ctx.option("DENS"))
+    quadratic = len(solid.edges) > 0
+    if quadratic:
+        middles_of(ctx).add(ids[solid.edges], solid.middles)
 
     def mesh(cells: Any) -> Maillage:
-        return new_mesh(ctx, [(SIMPLEX[cells.shape[1]], ids[np.asarray(cells)])])
+        return finished(ctx, new_mesh(ctx, [(SIMPLEX[cells.shape[1]], ids[np.asarray(cells)])]), quadratic)
 
     faces, table = Table(), Table()
     for number, face in enumerate(solid.faces, 1):

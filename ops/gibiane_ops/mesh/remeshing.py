@@ -9,10 +9,13 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, TABLE, Table, type_of
+from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.errors import MeshingFailed
+from gibiane_ops.kernels.mesh import unions
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
-from gibiane_ops.mesh.filling import sizes_at
+from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
+from gibiane_ops.mesh.filling import fill_contour, fill_envelope, sizes_at
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.maillage import Maillage, Point
 
@@ -28,7 +31,9 @@ REMA = operator(
     "`M2 T2 = REMAILLER M1 size 'GROU' T1`: the MAILLAGE in the table T1 (parts of M1, of its boundary, of "
     "edges, points) are found again on M2 under the same indices. Index PAIRES of T1, a table of tables "
     "(1: face of the second body, 2: face of the first), names contact faces that are meshed once and "
-    "duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning and M1 is returned.",
+    "duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning and M1 is returned. "
+    "`M2 = REMAILLER M1 BORD size` keeps the whole boundary BORD (ENVE M1, CONT M1) as it is, node for node. Meshes "
+    "of second degree get mid-nodes again; on the boundary they are those of new straight edges, unless it is kept.",
     example="OPTI DIME 2 ELEM TRI3 ; C = CERC 16 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; S = SURF C 'PLAN' ; "
     "S2 = REMAILLER S 0.1 ; MESS ((NBEL S2) > (NBEL S)) ;",
     see=["MAILLER", "TAILLE"],
@@ -50,6 +55,7 @@ class Groups:
         self.keys: dict[str, Any] = {}
         self.cells: dict[str, IntArray] = {}
         self.points: set[str] = set()
+        self.quadratic: set[str] = set()
         self.pairs: list[tuple[str, str]] = []
         self.pair_keys: list[Any] = []
         values: dict[int, str] = {}
@@ -67,7 +73,9 @@ class Groups:
             self.points.add(name)
             cells = np.array([[value.node]])
         elif isinstance(value, Maillage):
-            block = value.single()
+            if is_quadratic(value):
+                self.quadratic.add(name)
+            block = linear_mesh(self.ctx, value).single()
             if block is None or block.shape not in SIMPLEX.values():
                 self.ctx.fail(
                     16,
@@ -118,7 +126,8 @@ class Groups:
         table = Table()
         made: dict[str, Maillage] = {}
         for name, cells in groups.items():
-            made[name] = new_mesh(self.ctx, [(SIMPLEX[cells.shape[1]], ids[cells])])
+            group = new_mesh(self.ctx, [(SIMPLEX[cells.shape[1]], ids[cells])])
+            made[name] = finished(self.ctx, group, name in self.quadratic)
         for name, index in self.keys.items():
             if name.startswith("pair"):
                 continue
@@ -142,6 +151,8 @@ def _remesh(
 
     dim = dimension(ctx)
     wanted = {2: "TRI3", 3: "TET4"}.get(dim)
+    quadratic, old = is_quadratic(g), g
+    g = linear_mesh(ctx, g)
     block = g.single()
     if block is None or block.shape != wanted:
         ctx.fail(
@@ -169,12 +180,13 @@ def _remesh(
             if not souci:
                 raise
             ctx.warn(27, "no new mesh could be made, the old one is kept: {reason}", at="g", reason=failure.reason)
-            return g, grou if grou is not None else Table()
+            return old, grou if grou is not None else Table()
     from scipy.spatial import cKDTree
 
     _, near = cKDTree(store.coords[nodes][:, :dim]).query(result.points)
     ids = store.add(result.points, store.density[nodes][near])
-    return new_mesh(ctx, [(wanted, ids[result.cells])]), groups.renewed(result.groups, ids)
+    mesh = finished(ctx, new_mesh(ctx, [(wanted, ids[result.cells])]), quadratic)
+    return mesh, groups.renewed(result.groups, ids)
 
 
 @REMA.form(
@@ -186,6 +198,35 @@ def _remesh(
 )
 def _with_groups(ctx: Context, g: Maillage, size: float | ChPoint, grou: Table, souci: bool) -> tuple[Maillage, Table]:
     return _remesh(ctx, g, size, grou, souci)
+
+
+@REMA.form(Arg("g", MAILLAGE, "mesh"), Arg("bord", MAILLAGE, "its boundary, to be kept"), SIZE, gives=[MAILLAGE])
+def _kept_boundary(ctx: Context, g: Maillage, bord: Maillage, size: float | ChPoint) -> Maillage:
+    dim = dimension(ctx)
+    fill = {2: ("TRI3", "SEG2"), 3: ("TET4", "TRI3")}
+    corners, kept = linear_mesh(ctx, g), linear_mesh(ctx, bord)
+    if dim not in fill or corners.shapes != [fill[dim][0]]:
+        ctx.fail(
+            16,
+            "a mesh of {wanted} is wanted, this one holds {shapes}",
+            at="g",
+            wanted=fill.get(dim, ("TRI3",))[0],
+            shapes=" ".join(g.shapes) or "no element",
+            hint="CHAN {wanted} cuts other elements",
+        )
+    facets = topology.boundary(corners.kernel_blocks)[fill[dim][1]].nodes
+    given = kept.cells(fill[dim][1])
+    if len(given) != len(facets) or not unions.is_in(facets, given).all():
+        ctx.fail(
+            251,
+            "a part of the boundary cannot be kept alone: {given} of its {total} facets are given",
+            at="bord",
+            given=int(unions.is_in(facets, given).sum()) if len(given) else 0,
+            total=len(facets),
+            hint="ENVE (in the plane CONT) gives the whole boundary",
+        )
+    mesh = fill_envelope(ctx, facets, size, "g") if dim == 3 else fill_contour(ctx, facets, size, False, "g")
+    return finished(ctx, mesh, is_quadratic(g))
 
 
 @REMA.form(Arg("g", MAILLAGE, "mesh"), SIZE, SOUC, gives=[MAILLAGE])

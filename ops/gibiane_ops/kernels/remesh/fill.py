@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
+from gibiane_ops.kernels.remesh.inside import refined
 from gibiane_ops.kernels.remesh.session import (
     gmsh_model,
     read_nodes,
@@ -17,6 +19,9 @@ from gibiane_ops.kernels.remesh.session import (
     set_constant_size,
     set_size_field,
 )
+
+# A mesh of fewer elements than this part of what the sizes ask for is made again by another method.
+FAR_FROM_WANTED = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +57,8 @@ def mesh_volume(points: FloatArray, facets: IntArray, sizes: float | FloatArray 
     facets : (m, 3) int64
         Triangles of one or several closed surfaces; the largest contains the others, which are cavities.
     sizes : float or (n_points,) float64, length, optional
-        Edge wanted inside, one value or one per node of the envelope; by default the spacing of the envelope.
+        Edge wanted inside, one value or one per node of the envelope; by default the spacing of the envelope. Where
+        the envelope is much coarser, elements grow from the size inside to its facets.
 
     Returns
     -------
@@ -74,7 +80,40 @@ def mesh_volume(points: FloatArray, facets: IntArray, sizes: float | FloatArray 
     """
     _check_sizes(sizes)
     shells = _shells(facets)
-    used = np.unique(facets)
+    filled = _filled(points, shells, sizes)
+    if sizes is not None and len(filled.cells) < _wanted(filled, sizes) / FAR_FROM_WANTED:
+        # Gmsh puts no point inside a coarse envelope whatever the size; its parallel mesher (HXT) does, but does not
+        # give the same mesh twice.
+        finer = refined(filled.points, filled.cells, facets, _size_of(points, np.unique(facets), sizes), len(points))
+        filled = FilledMesh(*finer, filled.rest)
+    if len(filled.cells) == 0:
+        raise MeshingFailed("no tetrahedron was made; does the envelope cross itself?")
+    outside = topology.boundary([("TET4", filled.cells)])["TRI3"].nodes
+    group, _ = topology.group_by_nodes(np.vstack([facets, outside]))
+    if len(outside) != len(facets) or len(np.unique(group)) != len(facets):
+        raise MeshingFailed("the mesher changed the envelope")
+    return filled
+
+
+def _size_of(points: FloatArray, used: IntArray, sizes: float | FloatArray) -> Callable[[FloatArray], FloatArray]:
+    """Return the size wanted anywhere inside: constant, or linear between the nodes of the envelope."""
+    if not np.ndim(sizes):
+        return lambda places: np.full(len(places), float(np.asarray(sizes)))
+    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
+
+    given = np.asarray(sizes, np.float64)[used]
+    linear, nearest = LinearNDInterpolator(points[used], given), NearestNDInterpolator(points[used], given)
+
+    def size(places: FloatArray) -> FloatArray:
+        values = linear(places)
+        return np.asarray(np.where(np.isnan(values), nearest(places), values), np.float64)
+
+    return size
+
+
+def _filled(points: FloatArray, shells: list[IntArray], sizes: float | FloatArray | None) -> FilledMesh:
+    """Run the mesher inside closed surfaces."""
+    used = np.unique(np.concatenate(shells))
     tags = np.zeros(len(points), np.int64)
     tags[used] = np.arange(1, len(used) + 1)
     with gmsh_model({"Mesh.MeshSizeExtendFromBoundary": 1 if sizes is None else 0}) as gmsh:
@@ -92,14 +131,21 @@ def mesh_volume(points: FloatArray, facets: IntArray, sizes: float | FloatArray 
         gmsh.model.mesh.generate(3)
         found, position = read_nodes(gmsh)
         cells = read_simplices(gmsh, 3, 1, position)
-    filled = _with_given_points(points, used, found, position[1 : len(used) + 1], cells)
-    if len(cells) == 0:
-        raise MeshingFailed("no tetrahedron was made; does the envelope cross itself?")
-    outside = topology.boundary([("TET4", filled.cells)])["TRI3"].nodes
-    group, _ = topology.group_by_nodes(np.vstack([facets, outside]))
-    if len(outside) != len(facets) or len(np.unique(group)) != len(facets):
-        raise MeshingFailed("the mesher changed the envelope")
-    return filled
+    return _with_given_points(points, used, found, position[1 : len(used) + 1], cells)
+
+
+def _wanted(filled: FilledMesh, sizes: float | FloatArray) -> float:
+    """Estimate how many regular tetrahedra of the wanted sizes the mesh holds."""
+    X = filled.points[filled.cells]
+    volume = np.abs(np.linalg.det(X[:, 1:] - X[:, :1])) / 6
+    given = np.asarray(sizes, np.float64)
+    if given.ndim:
+        # Inside, where no size is given, that of the boundary nodes of the same element, or the mean.
+        known = np.concatenate([given, np.full(len(filled.points) - len(given), np.nan)])[filled.cells]
+        inner = np.isnan(known)
+        mean = float(given[np.unique(filled.cells[filled.cells < len(given)])].mean())
+        given = np.where(inner, mean, known).mean(axis=1)
+    return float((volume * 6 * np.sqrt(2) / given**3).sum())
 
 
 def _set_inner_sizes(gmsh: Any, points: FloatArray, plane: FloatArray, sizes: float | FloatArray | None) -> None:

@@ -55,12 +55,18 @@ class MeshedSolid:
         The boundary, face by face of the geometry; the solid lies behind.
     named : dict of str to list of (k, c) int64
         The groups that a file names: c - 1 is their dimension.
+    edges : (e, 2) int64
+        Every edge once, when mid-nodes were asked for.
+    middles : (e, 3) float64, length
+        Places of their mid-nodes, on the curved faces where there are any.
     """
 
     points: FloatArray
     cells: IntArray
     faces: list[IntArray]
     named: dict[str, IntArray] = field(default_factory=dict)
+    edges: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
+    middles: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def _rotation_to(vector: FloatArray) -> tuple[float, FloatArray]:
@@ -113,7 +119,7 @@ def _add_half(occ: Any, centre: FloatArray, vector: FloatArray, radius: float, d
     return tuple(occ.intersect([(2, disc)], [(2, box)])[0][0])
 
 
-def mesh_solid(solids: Sequence[Solid], size: float, dim: int) -> MeshedSolid:
+def mesh_solid(solids: Sequence[Solid], size: float, dim: int, degree: int = 1) -> MeshedSolid:
     """Mesh a solid made of simple ones with simplices.
 
     Parameters
@@ -124,6 +130,8 @@ def mesh_solid(solids: Sequence[Solid], size: float, dim: int) -> MeshedSolid:
         Edge wanted.
     dim : int
         3, or 2 for plane figures.
+    degree : int
+        2 to have mid-nodes too.
 
     Returns
     -------
@@ -158,10 +166,10 @@ def mesh_solid(solids: Sequence[Solid], size: float, dim: int) -> MeshedSolid:
         occ.synchronize()
         set_constant_size(gmsh, size)
         gmsh.model.mesh.generate(dim)
-        return _read(gmsh, dim)
+        return _read(gmsh, dim, degree)
 
 
-def mesh_file(path: Path, size: float | None, dim: int) -> MeshedSolid:
+def mesh_file(path: Path, size: float | None, dim: int, degree: int = 1) -> MeshedSolid:
     """Read a file of gmsh (geometry or mesh) or of a CAD system (STEP, BREP), and mesh it if it holds no mesh.
 
     Parameters
@@ -171,6 +179,8 @@ def mesh_file(path: Path, size: float | None, dim: int) -> MeshedSolid:
         Edge wanted, instead of what the file says.
     dim : int
         3 or 2.
+    degree : int
+        2 to have mid-nodes too.
 
     Returns
     -------
@@ -189,10 +199,10 @@ def mesh_file(path: Path, size: float | None, dim: int) -> MeshedSolid:
             if size is not None:
                 set_constant_size(gmsh, size)
             gmsh.model.mesh.generate(dim)
-        return _read(gmsh, dim)
+        return _read(gmsh, dim, degree)
 
 
-def _read(gmsh: Any, dim: int) -> MeshedSolid:
+def _read(gmsh: Any, dim: int, degree: int) -> MeshedSolid:
     """Read the mesh of the model."""
     points, position = read_nodes(gmsh)
     cells = read_simplices(gmsh, dim, -1, position)
@@ -218,7 +228,37 @@ def _read(gmsh: Any, dim: int) -> MeshedSolid:
     new = np.full(len(points), -1, np.int64)
     new[used] = np.arange(len(used))
     kept = {title: new[group] for title, group in named.items() if (new[group] >= 0).all()}
-    return MeshedSolid(points[used], compact.reshape(cells.shape), [new[face] for face in faces], kept)
+    edges, middles = _middles(gmsh, dim, points) if degree == 2 else (np.zeros((0, 2), np.int64), np.zeros((0, 3)))
+    return MeshedSolid(
+        points[used], compact.reshape(cells.shape), [new[face] for face in faces], kept, new[edges], middles
+    )
+
+
+# Elements of second degree of gmsh by dimension: their code, and the corners that each mid-node stands between.
+_SECOND = {
+    2: (9, ((0, 1), (1, 2), (2, 0))),
+    3: (11, ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3))),
+}
+
+
+def _middles(gmsh: Any, dim: int, points: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Let gmsh put mid-nodes on its geometry; return the edges (rows of the points read before) and their places."""
+    from scipy.spatial import cKDTree
+
+    gmsh.model.mesh.setOrder(2)
+    every, place = read_nodes(gmsh)
+    code, local = _SECOND[dim]
+    tags = gmsh.model.mesh.getElementsByType(code)[1].astype(np.int64).reshape(-1, dim + 1 + len(local))
+    # Gmsh numbers the nodes again; the corners stand where they stood.
+    corners = np.unique(tags[:, : dim + 1])
+    gap, row = cKDTree(points).query(every[place[corners]])
+    if gap.max() > 1e-9 * np.ptp(points, axis=0).max():
+        raise MeshingFailed("the mesher moved the corners of the elements")
+    number = np.zeros(int(corners.max()) + 1, np.int64)
+    number[corners] = row
+    ends = number[tags[:, np.array(local)]].reshape(-1, 2)
+    edges, first = np.unique(np.sort(ends, axis=1), axis=0, return_index=True)
+    return edges, every[place[tags[:, dim + 1 :].ravel()[first]]]
 
 
 def _outward(facets: IntArray, skin: IntArray) -> IntArray:
