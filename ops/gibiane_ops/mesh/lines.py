@@ -84,7 +84,8 @@ DROI = operator(
     notice="`L = DROIT N P1 P2` makes N equal segments. Without N, the densities of the two points (or 'DINI' "
     "and 'DFIN') give the number and the sizes; with N negative, |N| segments of sizes that follow the "
     "densities. A line in place of P1 is prolonged from its last point; without P2 it is closed on its "
-    "first point. D is another name of this operator.",
+    "first point. With OPTI ELEM of second degree lines are SEG3, their mid-nodes on the line or arc. D is another "
+    "name of this operator.",
     example="OPTI DIME 2 ELEM QUA4 ; L = DROIT 10 (0. 0.) (1. 0.) ; MESS (NBEL L) ;",
     see=["CERCLE", "DALLER", "DENSITE"],
 )

@@ -117,7 +117,8 @@ TRAN = operator(
     summary="surface swept by a line that is translated",
     notice="`S = L TRAN N V` sweeps a line along the vector V in N layers; without N, or with N negative, the "
     "densities of the line (or 'DINI' and 'DFIN') give the layers, as in DROIT. The elements have the "
-    "type of OPTI ELEM (QUA4 or TRI3). Sides 1 to 4 are recorded: see COTE. A surface in place of the "
+    "type of OPTI ELEM (QUA4 or TRI3; QUA8 or TRI6 with mid-nodes on the curves swept, also when the "
+    "line has them). Sides 1 to 4 are recorded: see COTE. A surface in place of the "
     "line is prolonged from its side 3.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 3 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ; MESS (NBEL S) ;",
     see=["ROTA", "REGLER", "DALLER", "COTE"],

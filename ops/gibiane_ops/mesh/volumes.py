@@ -42,7 +42,8 @@ VOLU = operator(
     summary="volume swept by a surface, or inside an envelope",
     notice="`V = S VOLU N 'TRAN' VEC` sweeps a surface along a vector in N layers, `S VOLU N 'ROTA' angle P1 P2` "
     "turns it about an axis (degrees), `S VOLU N 'GENE' L` moves it along a line, and `S1 VOLU N S2` "
-    "joins two surfaces that are meshed alike. Quadrangles give CUB8, triangles PRI6. Without N or "
+    "joins two surfaces that are meshed alike. Quadrangles give CUB8, triangles PRI6; with mid-nodes, "
+    "or OPTI ELEM of second degree, CU20 and PR15. Without N or "
     "with N negative, densities (or 'DINI' and 'DFIN') give the layers, as in DROIT; 'PROG' with a "
     "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
     "volume in place of S is prolonged from its face 2. `V = ENV VOLU` alone fills a closed envelope "
