@@ -70,7 +70,7 @@ def _dispatch(arguments: list[str]) -> int:
         if not operands:
             raise _Usage("-i needs a script")
         return _interactive(options, operands[0], operands[1:])
-    if command in _COMMANDS and not Path(command).exists():
+    if command in _COMMANDS and not Path(command).is_file():
         return int(_COMMANDS[command](options, operands))
     if command == "-":
         session = _session(options, operands)
