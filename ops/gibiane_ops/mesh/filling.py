@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
-from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE, POINT
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MAILLAGE
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import edges
-from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of, surface_shape
+from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import LINEAR, checked_degree, finished, linear_mesh, wants_quadratic
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.maillage import Maillage
@@ -66,13 +64,13 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
     return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
 
 
-def _numbered(ctx: Context, cells: list[IntArray]) -> tuple[IntArray, list[IntArray]]:
+def numbered(ctx: Context, cells: list[IntArray]) -> tuple[IntArray, list[IntArray]]:
     """Return the nodes of elements, sorted, and the elements by ranks in that list."""
     nodes = np.unique(np.concatenate([each.ravel() for each in cells]))
     return nodes, [np.searchsorted(nodes, each) for each in cells]
 
 
-def _added(ctx: Context, nodes: IntArray, points: FloatArray) -> IntArray:
+def added(ctx: Context, nodes: IntArray, points: FloatArray) -> IntArray:
     """Return ids for the points of a filled mesh: those given first, then new nodes of their mean density."""
     store = nodes_of(ctx)
     inner = points[len(nodes) :]
@@ -84,12 +82,12 @@ def fill_contour(ctx: Context, segments: IntArray, size: Size, quadrangles: bool
     """Mesh the inside of closed plane lines."""
     from gibiane_ops.kernels.remesh import mesh_surface
 
-    nodes, (local,) = _numbered(ctx, [segments])
+    nodes, (local,) = numbered(ctx, [segments])
     sizes = sizes_at(ctx, size, nodes)
     dim = dimension(ctx)
     with explained(ctx, at, failed=28):
         filled = mesh_surface(nodes_of(ctx).coords[nodes][:, :dim], local, sizes, quadrangles=quadrangles)
-    ids = _added(ctx, nodes, filled.points)
+    ids = added(ctx, nodes, filled.points)
     return new_mesh(ctx, [("QUA4" if quadrangles else "TRI3", ids[filled.cells]), ("TRI3", ids[filled.rest])])
 
 
@@ -98,11 +96,11 @@ def fill_envelope(ctx: Context, facets: IntArray, size: Size, at: str) -> Mailla
     from gibiane_ops.kernels.remesh import mesh_volume
 
     _check_closed(ctx, facets, at)
-    nodes, (local,) = _numbered(ctx, [facets])
+    nodes, (local,) = numbered(ctx, [facets])
     sizes = sizes_at(ctx, size, nodes)
     with explained(ctx, at):
         filled = mesh_volume(nodes_of(ctx).coords[nodes], local, sizes)
-    ids = _added(ctx, nodes, filled.points)
+    ids = added(ctx, nodes, filled.points)
     return new_mesh(ctx, [("TET4", ids[filled.cells])])
 
 
@@ -160,43 +158,6 @@ def contour_of(ctx: Context, g: Maillage, at: str) -> IntArray:
             hint="ELIM joins ends at one place; DROIT L closes a line",
         )
     return segments
-
-
-SURF = operator(
-    "SURFACE",
-    topic="mesh",
-    summary="mesh of the inside of a closed line",
-    notice="`S = SURF L 'PLAN'` fills plane closed lines, the largest outside and the others as holes, with "
-    "triangles or quadrangles (OPTI ELEM). The segments of the lines are kept as they are; inside, the "
-    "elements follow their lengths, or the CHPOINT or FLOTTANT given. Elements turn as the outer line does.",
-    example="OPTI DIME 2 ELEM TRI3 ; C = CERC 24 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; "
-    "S = SURF C 'PLAN' ; MESS ((MESU S) > 3.) ;",
-    see=["DALLER", "MAILLER", "CONTOUR"],
-)
-
-
-@SURF.form(
-    Arg("g", MAILLAGE, "closed lines"),
-    SIZE,
-    Key(
-        ("PLAN", "SPHE", "CYLI", "CONI", "TORI"),
-        "surface that holds the nodes",
-        Arg("points", POINT, many=True, optional=True),
-        name="on",
-    ),
-    gives=[MAILLAGE],
-)
-def _surface(ctx: Context, g: Maillage, size: Size, on: Any) -> Maillage:
-    if on is not None and on[0] != "PLAN":
-        ctx.fail(
-            251,
-            "SURF on a curved surface ('{kind}') is not available",
-            at="on",
-            kind=on[0],
-            hint="DALL can put its nodes on a sphere, a cylinder or a cone",
-        )
-    filled = fill_contour(ctx, contour_of(ctx, g, "g"), size, surface_shape(ctx) == "QUA4", "g")
-    return finished(ctx, filled, wants_quadratic(ctx, g))
 
 
 def _envelope(ctx: Context, g: Maillage, at: str) -> IntArray:

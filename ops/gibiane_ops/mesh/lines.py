@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,65 +16,17 @@ from gibiane_ops.mesh.building import (
     axis_end,
     dimension,
     explained,
-    join,
     line_between,
-    line_nodes,
     new_mesh,
     nodes_of,
     places_along,
     reference,
     reversed_mesh,
 )
-from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh, quadratic_mesh, wants_quadratic
+from gibiane_ops.mesh.degree import is_quadratic, linear_mesh, quadratic_mesh
+from gibiane_ops.mesh.paths import COUNT, DFIN, DINI, ENDS, End, end_sizes, first_node, last_node, line_along
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
-from gibiane_ops.values.middles import middles_of
-
-COUNT = Arg("n", ENTIER, "number of elements", optional=True)
-DINI = Key("DINI", "density at the first end", Arg("d", FLOTTANT))
-DFIN = Key("DFIN", "density at the other end", Arg("d", FLOTTANT))
-ENDS = (POINT, MAILLAGE)
-End = Point | Maillage
-
-
-def _first(ctx: Context, end: End, at: str) -> int:
-    return end.node if isinstance(end, Point) else int(line_nodes(ctx, end, at)[0])
-
-
-def _last(ctx: Context, end: End, at: str) -> int:
-    return end.node if isinstance(end, Point) else int(line_nodes(ctx, end, at)[-1])
-
-
-def _sizes(ctx: Context, start: int, end: int, dini: float | None, dfin: float | None) -> tuple[float, float]:
-    density = nodes_of(ctx).density
-    return (float(density[start]) if dini is None else dini), (float(density[end]) if dfin is None else dfin)
-
-
-def _build(
-    ctx: Context,
-    a: End,
-    b: End | None,
-    start: int,
-    end: int,
-    path: Callable[[FloatArray], FloatArray],
-    places: FloatArray,
-    sizes: tuple[float, float],
-) -> Maillage:
-    """Join two nodes along a path, (k,) from 0 to 1 to (k, 3); lines given for ends are put before and after."""
-    given = [each for each in (a, b) if isinstance(each, Maillage)]
-    quadratic = wants_quadratic(ctx, *given)
-    inner = places[1:-1]
-    density = sizes[0] + inner * (sizes[1] - sizes[0])
-    ids = nodes_of(ctx).add(path(inner), density) if len(inner) else np.zeros(0, np.int64)
-    nodes = np.concatenate([[start], ids, [end]])
-    if quadratic:
-        middles_of(ctx).add(chains.segments_of(nodes), path((places[1:] + places[:-1]) / 2))
-    parts = [linear_mesh(ctx, a)] if isinstance(a, Maillage) else []
-    parts.append(line_between(ctx, nodes))
-    if isinstance(b, Maillage):
-        parts.append(linear_mesh(ctx, b))
-    return finished(ctx, join(parts), quadratic)
-
 
 DROI = operator(
     "DROIT",
@@ -101,7 +52,7 @@ DROI = operator(
 )
 def _droit(ctx: Context, n: int | None, a: End, b: End | None, dini: float | None, dfin: float | None) -> Maillage:
     dimension(ctx)
-    start = _last(ctx, a, "a")
+    start = last_node(ctx, a, "a")
     if b is None and isinstance(a, Point):
         ctx.fail(
             37,
@@ -110,12 +61,12 @@ def _droit(ctx: Context, n: int | None, a: End, b: End | None, dini: float | Non
             label="one end only",
             hint="in space a point needs three numbers, in parentheses: (0. 0. 1.)",
         )
-    end = _first(ctx, a if b is None else b, "b")
+    end = first_node(ctx, a if b is None else b, "b")
     store = nodes_of(ctx)
     x0, x1 = store.coords[start], store.coords[end]
-    d0, d1 = _sizes(ctx, start, end, dini, dfin)
+    d0, d1 = end_sizes(ctx, start, end, dini, dfin)
     places = places_along(ctx, float(np.linalg.norm(x1 - x0)), d0, d1, n)
-    return _build(ctx, a, b, start, end, lambda t: x0 + t[:, None] * (x1 - x0), places, (d0, d1))
+    return line_along(ctx, a, b, start, end, lambda t: x0 + t[:, None] * (x1 - x0), places, (d0, d1))
 
 
 CERC = operator(
@@ -157,8 +108,8 @@ def _cercle_rota(
     if elim and abs(rota) != 360.0:
         ctx.fail(21, "'ELIM' closes a full turn only, not {angle} degrees", angle=rota)
     store = nodes_of(ctx)
-    start = _last(ctx, a, "a")
-    d0, d1 = _sizes(ctx, start, start, dini, dfin)
+    start = last_node(ctx, a, "a")
+    d0, d1 = end_sizes(ctx, start, start, dini, dfin)
     first, centre = store.coords[start], c.coords
     axis = axis_end(ctx, c, e)
     with explained(ctx, "c"):
@@ -170,7 +121,7 @@ def _cercle_rota(
         return np.concatenate(turned) if turned else np.zeros((0, 3))
 
     end = start if elim else int(store.add(path(places[-1:]), d1)[0])
-    return _build(ctx, a, None, start, end, path, places, (d0, d1))
+    return line_along(ctx, a, None, start, end, path, places, (d0, d1))
 
 
 @CERC.form(
@@ -196,14 +147,14 @@ def _cercle(
     dfin: float | None,
 ) -> Maillage:
     dimension(ctx)
-    start, end = _last(ctx, a, "a"), _first(ctx, a if b is None else b, "b")
+    start, end = last_node(ctx, a, "a"), first_node(ctx, a if b is None else b, "b")
     store = nodes_of(ctx)
     x0, x1 = store.coords[start], store.coords[end]
-    d0, d1 = _sizes(ctx, start, end, dini, dfin)
+    d0, d1 = end_sizes(ctx, start, end, dini, dfin)
     if start == end:
         ctx.fail(21, "its two ends are one point", hint="CERC 'ROTA' 360. P1 C 'ELIM' makes a full circle")
     arc = _through(ctx, x0, c.coords, x1) if through else _about(ctx, x0, c.coords, x1)
-    return _build(ctx, a, b, start, end, arc, places_along(ctx, arc.length, d0, d1, n), (d0, d1))
+    return line_along(ctx, a, b, start, end, arc, places_along(ctx, arc.length, d0, d1, n), (d0, d1))
 
 
 def _through(ctx: Context, x0: FloatArray, middle: FloatArray, x1: FloatArray) -> arcs.Arc:

@@ -92,3 +92,34 @@ def to_cone(points: FloatArray, apex: FloatArray, b: FloatArray, on: FloatArray)
     if height[0] == 0:
         raise BadValue("height of the cone", 0.0, "a point that is not level with the apex")
     return np.asarray(apex + along[:, None] * u + (along * radius[0] / height[0])[:, None] * away, np.float64)
+
+
+def to_torus(points: FloatArray, centre: FloatArray, b: FloatArray, small: FloatArray, on: FloatArray) -> FloatArray:
+    """Put points on a torus, from its circle of centres.
+
+    Parameters
+    ----------
+    points : (k, 3) float64, length
+    centre, b, small, on : (3,) float64, length
+        The centre, a second point of the axis, the centre of a small circle, and a point of the torus.
+
+    Returns
+    -------
+    (k, 3) float64, length
+
+    Raises
+    ------
+    BadValue
+        A point is on the axis, or on the circle of centres.
+    """
+    u = direction(centre, b)
+    along, radius, away = _radial(points, centre, u)
+    height, large, _ = _radial(small[None], centre, u)
+    own, own_radius, _ = _radial(on[None], centre, u)
+    size = float(np.hypot(own - height, own_radius - large)[0])
+    up, out = along - height, radius - large
+    distance = np.hypot(up, out)
+    if (distance == 0).any():
+        raise BadValue("distance to the circle of centres", 0.0, "a patch that does not meet it")
+    grow = size / distance
+    return np.asarray(centre + (height + grow * up)[:, None] * u + (large + grow * out)[:, None] * away, np.float64)

@@ -22,6 +22,8 @@ from gibiane_ops.kernels.remesh.session import (
 
 # A mesh of fewer elements than this part of what the sizes ask for is made again by another method.
 FAR_FROM_WANTED = 8.0
+# Points along each side of the grid that carries sizes divided by a scale.
+GRID = 65
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +168,22 @@ def _set_inner_sizes(gmsh: Any, points: FloatArray, plane: FloatArray, sizes: fl
         set_constant_size(gmsh, float(sizes))
 
 
+def _set_scaled_sizes(
+    gmsh: Any,
+    points: FloatArray,
+    size: Callable[[FloatArray], FloatArray],
+    scale: Callable[[FloatArray], FloatArray],
+) -> None:
+    """Install sizes divided by a scale, on a grid over the points fine enough to follow it."""
+    from scipy.spatial import Delaunay
+
+    low, high = points.min(axis=0), points.max(axis=0)
+    axes = [np.linspace(a, b, GRID) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2)
+    simplices = np.asarray(Delaunay(grid).simplices, np.int64)
+    set_size_field(gmsh, np.pad(grid, ((0, 0), (0, 1))), simplices, size(grid) / scale(grid))
+
+
 def _with_given_points(
     points: FloatArray, used: IntArray, found: FloatArray, given: IntArray, *cells: IntArray
 ) -> FilledMesh:
@@ -201,6 +219,7 @@ def mesh_surface(
     sizes: float | FloatArray | None = None,
     *,
     quadrangles: bool = False,
+    scale: Callable[[FloatArray], FloatArray] | None = None,
 ) -> FilledMesh:
     """Fill closed plane contours with triangles or quadrangles.
 
@@ -213,6 +232,9 @@ def mesh_surface(
         Edge wanted inside, one value or one per node of the contours; by default the spacing of the contours.
     quadrangles : bool
         Recombine the triangles.
+    scale : callable, optional
+        ``scale(points) -> (k,)``, for points of the plane z = 0 that stand for those of a surface: by how much lengths
+        grow there. Sizes are wanted on the surface, and must be given.
 
     Returns
     -------
@@ -230,7 +252,7 @@ def mesh_surface(
         When gmsh cannot be used.
     """
     _check_sizes(sizes)
-    contours = _contours(edges)
+    contours = contours_of(edges)
     space = np.pad(points, ((0, 0), (0, 3 - points.shape[1])))
     areas = np.array([_area_vector(space[contour]) for contour in contours])
     lengths = np.linalg.norm(areas, axis=1)
@@ -258,7 +280,10 @@ def mesh_surface(
         if quadrangles:
             gmsh.model.mesh.setRecombine(2, surface)
         axes = np.linalg.svd(normal[None])[2][1:]
-        _set_inner_sizes(gmsh, space[used], space[used] @ axes.T, _at(sizes, used))
+        if scale is None:
+            _set_inner_sizes(gmsh, space[used], space[used] @ axes.T, _at(sizes, used))
+        elif sizes is not None:
+            _set_scaled_sizes(gmsh, points[used], _size_of(points, used, sizes), scale)
         gmsh.model.mesh.generate(2)
         found, position = read_nodes(gmsh)
         given = np.array([position[int(gmsh.model.mesh.getNodes(0, int(node) + 1)[0][0])] for node in used])
@@ -289,8 +314,23 @@ def _area_vector(loop: FloatArray) -> FloatArray:
     return np.asarray(np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0) / 2, np.float64)
 
 
-def _contours(edges: IntArray) -> list[IntArray]:
-    """Follow segments into closed contours, starting each at the first segment not yet used."""
+def contours_of(edges: IntArray) -> list[IntArray]:
+    """Follow segments into closed contours, starting each at the first segment not yet used.
+
+    Parameters
+    ----------
+    edges : (m, 2) int64
+
+    Returns
+    -------
+    list of (k,) int64
+        The nodes of each in order.
+
+    Raises
+    ------
+    MeshingFailed
+        When a node does not have two segments.
+    """
     count = np.bincount(edges.ravel()) if len(edges) else np.zeros(1, np.int64)
     if len(edges) == 0 or (count[count > 0] != 2).any():
         raise MeshingFailed(

@@ -1,0 +1,106 @@
+"""Maps that keep angles, polynomial curves, seams."""
+
+import numpy as np
+import pytest
+
+from gibiane_ops.kernels.errors import BadValue, MeshingFailed
+from gibiane_ops.kernels.mesh import charts, curves, seams
+
+Z = np.array([0.0, 0.0, 1.0])
+O = np.zeros(3)  # noqa: E741
+
+
+def turn(n: int, radius: float, z: float, start: float = 0.0, end: float = 2 * np.pi) -> np.ndarray:
+    t = start + (end - start) * np.arange(n) / n
+    return np.stack([radius * np.cos(t), radius * np.sin(t), np.full(n, z)], axis=1)
+
+
+PATCH = [(1.0, 0.2), (1.2, 0.2), (1.3, 0.5), (1.1, 0.6)]
+SURFACES = {
+    "sphere": lambda a, b: np.array([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)]) * 2,
+    "cylinder": lambda a, b: np.array([2 * np.cos(a), 2 * np.sin(a), b]),
+    "cone": lambda a, b: np.array([b * np.cos(a), b * np.sin(a), 2 * b]),
+    "torus": lambda a, b: np.array([(3 + np.cos(b)) * np.cos(a), (3 + np.cos(b)) * np.sin(a), np.sin(b)]),
+}
+MAKE = {
+    "sphere": lambda x: charts.Sphere(O, x),
+    "cylinder": lambda x: charts.Cylinder(O, Z, x),
+    "cone": lambda x: charts.Cone(O, Z, x),
+    "torus": lambda x: charts.Torus(O, Z, np.array([3.0, 0.0, 0.0]), x),
+}
+
+
+@pytest.mark.parametrize("name", SURFACES)
+def test_charts_come_back_and_keep_angles(name: str) -> None:
+    x = np.array([SURFACES[name](a, b) for a, b in PATCH])
+    chart = MAKE[name](x)
+    (plane,) = chart.flat([x])
+    assert np.allclose(chart.space(plane), x, atol=1e-12)
+    assert np.allclose(chart.nearest(x), x, atol=1e-12)
+    step = 1e-6
+    tangents = [(chart.space(plane + step * e) - chart.space(plane - step * e)) / (2 * step) for e in np.eye(2)]
+    lengths = [np.linalg.norm(t, axis=1) for t in tangents]
+    assert np.allclose(lengths[0], chart.scale(plane), rtol=1e-7)
+    assert np.allclose(lengths[1], chart.scale(plane), rtol=1e-7)
+    assert np.allclose((tangents[0] * tangents[1]).sum(axis=1), 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["cylinder", "cone"])
+def test_contours_round_the_axis_become_rings(name: str) -> None:
+    loops = [turn(12, 1.0, 2.0), turn(12, 1.0 if name == "cylinder" else 2.0, 4.0)[::-1]]
+    chart = MAKE[name](np.concatenate(loops))
+    plane = chart.flat(loops)
+    for flat, loop in zip(plane, loops, strict=True):
+        assert np.ptp(np.hypot(*flat.T)) < 1e-12
+        assert np.allclose(chart.space(flat), loop, atol=1e-12)
+
+
+def test_charts_refuse_what_they_cannot_map() -> None:
+    ring = turn(12, 1.0, 0.0)
+    with pytest.raises(BadValue):
+        charts.Sphere(np.array([0.5, 0.0, 0.0]), ring)
+    with pytest.raises(MeshingFailed):
+        charts.Cylinder(O, Z, ring).flat([ring])
+    long = [ring, turn(12, 1.0, 100.0)[::-1]]
+    with pytest.raises(MeshingFailed):
+        charts.Cylinder(O, Z, np.concatenate(long)).flat(long)
+
+
+def test_a_curve_knows_its_length_and_divides_it() -> None:
+    """Y = x^2 from -1 to 1, forwards and backwards; the length is sqrt(5) + asinh(2)/2."""
+    exact = np.sqrt(5) + np.arcsinh(2) / 2
+    c = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    for curve in (curves.Curve(c, -1, 1), curves.Curve(c, 1, -1)):
+        assert curve.length == pytest.approx(exact, rel=1e-13)
+        fine = curve.by_length(np.linspace(0, 1, 5))
+        assert fine[2] == pytest.approx([0, 0, 0], abs=1e-12)
+        dense = [curve.by_length(np.linspace(a, a + 0.25, 400)) for a in (0, 0.25, 0.5, 0.75)]
+        quarters = [np.linalg.norm(np.diff(x, axis=0), axis=1).sum() for x in dense]
+        assert quarters == pytest.approx([exact / 4] * 4, rel=1e-5)
+
+
+def test_cubics_pass_where_they_must() -> None:
+    p = np.random.default_rng(1).standard_normal((4, 3))
+    curve = curves.cubic_through(p)
+    chords = np.linalg.norm(np.diff(p, axis=0), axis=1)
+    u = np.concatenate([[0], np.cumsum(chords) / chords.sum()])
+    assert np.allclose(curve.at(u), p, atol=1e-12)
+    h = curves.hermite(*p)
+    assert np.allclose(h.at(np.array([0.0, 1.0])), p[[0, 3]], atol=1e-12)
+    assert np.allclose((h.at(np.array([1e-7])) - p[0]) / 1e-7, p[1], atol=1e-5)
+    tip = curves.parabola(p[0], p[1], p[2])
+    assert np.allclose(np.cross(tip.at(np.array([1e-7]))[0] - p[0], p[1] - p[0]), 0, atol=1e-11)
+    with pytest.raises(BadValue):
+        curves.cubic_through(p[[0, 0, 1, 2]])
+
+
+@pytest.mark.parametrize(("m", "n"), [(2, 2), (2, 7), (5, 9), (1, 4)])
+def test_a_seam_fills_the_strip_once(m: int, n: int) -> None:
+    a = np.stack([np.linspace(0, 1, m) if m > 1 else np.array([0.5]), np.zeros(m), np.zeros(m)], axis=1)
+    b = np.stack([np.linspace(0, 1, n), np.ones(n), np.zeros(n)], axis=1)
+    x = np.concatenate([a, b])
+    cells = seams.seam(a, b)
+    area = np.cross(x[cells[:, 1]] - x[cells[:, 0]], x[cells[:, 2]] - x[cells[:, 0]])[:, 2] / 2
+    assert len(cells) == m + n - 2
+    assert (area > 0).all()
+    assert area.sum() == pytest.approx(1.0 if m > 1 else 0.5)
