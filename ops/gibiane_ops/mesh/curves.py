@@ -197,7 +197,7 @@ def _courbe(
     with explained(ctx, "points"):
         curve = curves.Curve(np.array([p.coords for p in points]), u1, u2)
     where = curve.by_parameter(np.array([0.0, 1.0]))
-    sizes = [ctx.option("DENS") if d is None else d for d in (dini, dfin)]
+    sizes = [float(ctx.option("DENS")) if d is None else d for d in (dini, dfin)]
     nodes = []
     for k, (end, at, find) in enumerate(((pini, "pini", last_node), (pfin, "pfin", first_node))):
         if end is None:
@@ -211,7 +211,7 @@ def _courbe(
         if (dini, dfin)[k] is None:
             sizes[k] = float(nodes_of(ctx).density[node])
     path = curve.by_length if regulier else curve.by_parameter
-    places = places_along(ctx, curve.length, *sizes, n)
+    places = places_along(ctx, curve.length, sizes[0], sizes[1], n)
     before, after = (end if isinstance(end, Maillage) else None for end in (pini, pfin))
     start = before or Point(nodes_of(ctx), nodes[0])
     return line_along(ctx, start, after, nodes[0], nodes[1], path, places, (sizes[0], sizes[1]))

@@ -152,9 +152,9 @@ class Revolution(Chart):
             ]
         for strip in strips[1:]:
             for column, period in ((0, 2 * np.pi), (1, self.period)):
-                away = float(strip[:, column].mean() - strips[0][:, column].mean())
+                gap = float(strip[:, column].mean() - strips[0][:, column].mean())
                 if np.isfinite(period):
-                    strip[:, column] -= period * round(away / period)
+                    strip[:, column] -= period * round(gap / period)
         return strips
 
     def _strip_of(self, plane: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -110,4 +110,4 @@ def cubic_through(points: FloatArray) -> Curve:
     if not (chords > 0).all():
         raise BadValue("chord", 0.0, "points at different places")
     u = np.concatenate([[0.0], np.cumsum(chords) / chords.sum()])
-    return Curve(np.linalg.solve(np.vander(u, 4, increasing=True), points))
+    return Curve(np.asarray(np.linalg.solve(np.vander(u, 4, increasing=True), points), np.float64))
