@@ -132,7 +132,7 @@ class Operands:
         """Add to an error the unread word that nothing has and that hides what follows, with a likely correction."""
         i = self.first_word()
         node = self.nodes[i] if i >= 0 else None
-        if i >= 0 and self.values[i] in cast3m.names() and not self.is_operator_word(i):
+        if i >= 0 and self.values[i] in cast3m.names() and self.session.operator(str(self.values[i])) is None:
             raise GibianeError(self.not_available(i, self.values[i], cast3m.names()[self.values[i]]))
         if not isinstance(node, Name) or self.values[i] != node.word or self.is_operator_word(i):
             return

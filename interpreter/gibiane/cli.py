@@ -20,7 +20,8 @@ usage: gibiane FILE [NAME=VALUE ...]    run a script (- reads it from standard i
        gibiane info NAME                describe an operator
        gibiane test DIR [--bless]       run golden scripts: x.dgibi against x.out
        gibiane docs [--check] [FILE]    write OPERATORS.md, or say whether it is stale
-options: --echo N  --lang fr|en  --allow-exec  --debug  --version  --help
+options: --echo N  --lang fr|en  --workers N  --dask tcp://HOST:PORT (who runs ASSI 'TOUS')
+          --allow-exec  --debug  --version  --help
          --strict  refuse what Cast3M refuses for its length: instructions of more than 500 characters
 """
 
@@ -100,7 +101,7 @@ def _options(arguments: list[str]) -> tuple[dict[str, Any], list[str]]:
     i = 0
     while i < len(arguments):
         word = arguments[i]
-        if word in ("--echo", "--lang"):
+        if word in ("--echo", "--lang", "--workers", "--dask"):
             if i + 1 == len(arguments):
                 raise _Usage(f"{word} needs a value")
             value = arguments[i + 1]
@@ -108,6 +109,8 @@ def _options(arguments: list[str]) -> tuple[dict[str, Any], list[str]]:
                 raise _Usage("--echo needs -1, 0, 1 or 2")
             if word == "--lang" and value not in ("fr", "en"):
                 raise _Usage("--lang needs fr or en")
+            if word == "--workers" and not (value.isdigit() and int(value) <= 1024):
+                raise _Usage("--workers needs a number of processes, 0 to 1024")
             options[word[2:]] = value
             i += 2
             continue
@@ -144,6 +147,10 @@ def _session(options: dict[str, Any], assignments: Sequence[str], *, interactive
         session.options["ECHO"] = int(options["echo"])
     if "lang" in options:
         session.options["LANG"] = "FRAN" if options["lang"] == "fr" else "ANGL"
+    if "workers" in options:
+        session.options["ASSI"] = int(options["workers"])
+    if "dask" in options:
+        session.options["DASK"] = options["dask"]
     session.options["EXEC"] = bool(options.get("allow-exec"))
     session.options["STRICT"] = bool(options.get("strict"))
     for text in assignments:

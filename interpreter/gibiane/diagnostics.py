@@ -48,6 +48,8 @@ G_CODES = {
     "G414": "too large for the memory",
     "G415": "solution of an ill-conditioned system",
     "G501": "file cut or of unknown format",
+    "G601": "workers of a study are lost",
+    "G602": "no cluster answers",
     "G900": "internal failure",
 }
 

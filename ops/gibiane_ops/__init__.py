@@ -69,6 +69,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     # lists
     "SORTIR": ("gibiane_ops.lists.files", "gibiane_ops.output.files", "gibiane_ops.exchange.writing"),
     "LIRE": ("gibiane_ops.lists.files", "gibiane_ops.exchange.reading"),
+    "ASSISTANT": ("gibiane_ops.assistants.operator",),
     "SAUVER": ("gibiane_ops.exchange.sessions",),
     "RESTITUER": ("gibiane_ops.exchange.sessions",),
     "OBTENIR": ("gibiane_ops.lists.files",),

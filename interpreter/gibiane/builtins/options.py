@@ -160,8 +160,9 @@ OPTIONS: dict[str, Reader] = {
     "LOCA": _switch,
     "EPSI": _anything,
     "INCO": _names,
+    "ASSI": _integer(0, 1024),
 }
-IGNORED = ("POTR", "POLI", "CADR", "SURV", "ATTE", "ASSI", "PARA", "PLAC", "NGMA", "NAVI", "LAGR", "ACCE", "OMEG")
+IGNORED = ("POTR", "POLI", "CADR", "SURV", "ATTE", "PARA", "PLAC", "NGMA", "NAVI", "LAGR", "ACCE", "OMEG")
 for _old in IGNORED:
     OPTIONS[_old] = _anything
 
@@ -173,6 +174,7 @@ DOCS: dict[str, str] = {
     "ECHO": "-1 errors only, 0 notes and warnings too, 1 instructions, 2 lines of procedures",
     "ERRE": "FATAL, NORMAL, CONTROLE or IGNORE: what an error does",
     "LANG": "FRAN or ANGL: language of listings and messages",
+    "ASSI": "worker processes of ASSI 'TOUS', 0 for none (gibiane --workers N)",
     "SORT": "file that SORT writes",
     "SAUV": "file that SAUV writes",
     "REST": "file that REST reads",

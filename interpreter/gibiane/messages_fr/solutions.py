@@ -31,4 +31,17 @@ SOLUTIONS: dict[str, str] = {
     "REST before OPTI DIME, or in another session": "REST avant OPTI DIME, ou dans une autre session",
     "the file holds no object {name}": "le fichier ne contient pas d'objet {name}",
     "it holds {known}": "il contient {known}",
+    # studies
+    "no TABLE of subtype ESCLAVE among its operands": "pas de TABLE de sous-type ESCLAVE parmi ses opérandes",
+    "T = TABL ESCLAVE ; T.1 = ... ; gives each case its value": "T = TABL ESCLAVE ; T.1 = ... ; donne à chaque cas sa valeur",
+    "table {n} of subtype ESCLAVE has other indices than the first": "la table {n} de sous-type ESCLAVE a d'autres indices que la première",
+    "some cases give {low} results, others {high}": "des cas donnent {low} résultats, d'autres {high}",
+    "a {type} cannot go to a worker": "un {type} ne peut aller chez un assistant",
+    "case {index}: {sentence}": "cas {index} : {sentence}",
+    "cases that failed: {cases}; the others are done": "cas qui ont échoué : {cases} ; les autres sont faits",
+    "a cluster needs the package distributed": "une grappe demande le paquet distributed",
+    'pip install "gibiane[dask]"': 'pip install "gibiane[dask]"',
+    "workers die again and again, {n} cases are not done: {reason}": "les assistants meurent les uns après les autres, {n} cas ne sont pas faits : {reason}",
+    "fewer workers need less memory at a time; with 'REPR' what is finished is kept": "moins d'assistants demandent moins de mémoire à la fois ; avec 'REPR' ce qui est fini est gardé",
+    "no cluster answers at {address}: {reason}": "aucune grappe ne répond à {address} : {reason}",
 }

@@ -6,16 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from gibiane.binding import Operands
-from gibiane.blocks import annotate
 from gibiane.forms import Arg, Key
 from gibiane.nodes import Literal, Name
-from gibiane.procedures import parameters
 from gibiane.registry import Context, operator
-from gibiane.source import SourceText
-from gibiane.syntax import parse
-from gibiane.values import MOT, Procedure, Texte, Value
+from gibiane.values import MOT
 from gibiane_ops.values.archive import Archive, BadArchive, NotSaveable, write_archive
 from gibiane_ops.values.nodes import node_store
+from gibiane_ops.values.texts import rebuilt
 
 EXTENSION = ".gibi.zip"
 # What every session begins with, and what concerns one run only.
@@ -116,7 +113,7 @@ def _rest(ctx: Context, q: Operands) -> None:
     try:
         archive = Archive(path)
         _check(ctx, archive, wanted)
-        found = archive.restore(ctx, node_store(ctx), _rebuilt)
+        found = archive.restore(ctx, node_store(ctx), rebuilt)
     except BadArchive as failure:
         ctx.fail(
             "G501",
@@ -149,22 +146,3 @@ def _check(ctx: Context, archive: Archive, wanted: list[str]) -> None:
             other=other,
             hint="REST before OPTI DIME, or in another session",
         )
-
-
-def _rebuilt(kind: str, text: str) -> Value:
-    """Make a TEXTE or a procedure of its text: it is parsed, not run."""
-    if kind == "Texte":
-        program = parse(SourceText("<TEXTE>", text.rstrip().rstrip(";") + " ;"))
-        if len(program) != 1 or program[0].bad is not None:
-            raise BadArchive("a TEXTE in it is not one instruction")
-        return Texte(text, program[0].items, program[0].source)
-    program = parse(SourceText("<REST>", text))
-    annotate(program)
-    first = program[0] if program else None
-    if first is None or first.head not in ("DEBP", "DEBM") or first.jump != len(program) - 1:
-        raise BadArchive("a procedure in it is not whole")
-    words: list[Any] = [item for item in first.items if isinstance(item, Name | Literal)]
-    name = words[1].name if isinstance(words[1], Name) else str(words[1].value)
-    at = first.items.index(words[1])
-    declared = parameters(first, first.items[at + 1 :])
-    return Procedure(name.upper()[:24], declared, program, 1, first.jump, first.head == "DEBM")

@@ -6,6 +6,7 @@ of this package's values. Nodes are written with their numbers, which shift when
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import zipfile
@@ -13,7 +14,7 @@ import zlib
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import scipy.sparse as sp
@@ -125,9 +126,9 @@ def _attributes(value: Any) -> dict[str, Any]:
 
 
 def write_archive(
-    path: Path, names: Mapping[str, Any], store: NodeStore, options: Mapping[str, Any], label: str
+    file: Path | BinaryIO, names: Mapping[str, Any], store: NodeStore, options: Mapping[str, Any], label: str
 ) -> None:
-    """Write named objects, the nodes of the session and a few options.
+    """Write named objects, the nodes of the session and a few options to a file, a path or an open one.
 
     Raises
     ------
@@ -147,8 +148,9 @@ def write_archive(
         "names": named,
         "objects": writer.objects,
     }
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+    if isinstance(file, Path):
+        file.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
         archive.writestr("session.json", json.dumps(content, ensure_ascii=False))
         for number, array in enumerate(writer.arrays):
             buffer = io.BytesIO()
@@ -170,9 +172,9 @@ class Archive:
     label : str
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, file: Path | BinaryIO) -> None:
         try:
-            with zipfile.ZipFile(path) as archive:
+            with zipfile.ZipFile(file) as archive:
                 content = json.loads(archive.read("session.json"))
                 if content["format"] != FORMAT:
                     raise BadArchive(f"its format is {str(content['format'])[:40]!r}")
@@ -188,6 +190,14 @@ class Archive:
             raise BadArchive("it is cut, or no archive") from failure
         except (ValueError, KeyError, TypeError, NotImplementedError, RuntimeError) as failure:
             raise BadArchive(f"its content is damaged ({type(failure).__name__})") from failure
+
+    def digest(self) -> bytes:
+        """Return bytes that are the same for the same content, whenever it was written."""
+        found = hashlib.sha256(json.dumps(self._content, sort_keys=True).encode())
+        for array in self._arrays:
+            found.update(f"{array.dtype}{array.shape}".encode())
+            found.update(np.ascontiguousarray(array).tobytes())
+        return found.digest()
 
     def restore(self, session: Any, store: NodeStore, rebuild: Rebuild) -> dict[str, Any]:
         """Add the nodes to a session and return the objects by name.

@@ -1,0 +1,1 @@
+"""Independent cases of one instruction, on this process, on local workers, or on a Dask cluster."""
