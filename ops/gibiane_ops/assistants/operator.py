@@ -131,7 +131,11 @@ def _spread(ctx: Context, cases: list[Case], folder: Path | None, results: _Resu
     except NotSaveable as failure:
         ctx.fail(39, "a {type} cannot go to a worker", type=failure.type_name)
     progress = _Progress(ctx, len(cases))
-    kept = {n: folder / f"case_{studies.fingerprint(session, c, found)}.zip" for n, c in enumerate(cases)} if folder else {}
+    kept = (
+        {n: folder / f"case_{studies.fingerprint(session, c, found)}.zip" for n, c in enumerate(cases)}
+        if folder
+        else {}
+    )
     missing = []
     for number in range(len(cases)):
         values = _kept(session, kept.get(number))

@@ -90,7 +90,8 @@ def test_an_interrupted_study_only_does_what_is_missing(tmp_path: Path) -> None:
 
 
 def test_a_changed_procedure_is_run_again(tmp_path: Path) -> None:
-    text = "DEBP CAS X*ENTIER ;\nFINP (X * {k}) ;\nT = TABL ESCLAVE ;\nT.1 = 4 ;\nR = ASSI 'TOUS' 'REPR' 'kept' CAS T ;\nMESS (R.1) ;\n"
+    text = "DEBP CAS X*ENTIER ;\nFINP (X * {k}) ;\nT = TABL ESCLAVE ;\nT.1 = 4 ;\n"
+    text += "R = ASSI 'TOUS' 'REPR' 'kept' CAS T ;\nMESS (R.1) ;\n"
     for k, shown in ((2, "8"), (3, "12"), (3, "12")):
         (tmp_path / "s.dgibi").write_text(text.format(k=k))
         command = [sys.executable, "-m", "gibiane", "s.dgibi"]
@@ -101,7 +102,9 @@ def test_a_changed_procedure_is_run_again(tmp_path: Path) -> None:
 
 @needs_proc
 def test_a_killed_worker_of_a_cluster_loses_no_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    distributed = pytest.importorskip("distributed", reason="SKIPPED LOUDLY: no dask.distributed, the cluster is not tested")
+    distributed = pytest.importorskip(
+        "distributed", reason="SKIPPED LOUDLY: no dask.distributed, the cluster is not tested"
+    )
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
@@ -120,7 +123,7 @@ def test_a_killed_worker_of_a_cluster_loses_no_case(tmp_path: Path, monkeypatch:
 def test_no_cluster_at_the_address(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     process = _run(tmp_path, "--dask", "tcp://127.0.0.1:1")
-    out, err = process.communicate(timeout=60)
+    _, err = process.communicate(timeout=60)
     assert process.returncode == 8
     assert "error[G602]" in err
     assert "Traceback" not in err
