@@ -23,6 +23,7 @@ LEVELS: dict[str, int] = {
     "G412": WARNING,
     "G413": WARNING,
     "G415": WARNING,
+    "G416": WARNING,
     "G900": FATAL,
 }
 G_CODES = {
@@ -47,6 +48,7 @@ G_CODES = {
     "G413": "several contact solutions",
     "G414": "too large for the memory",
     "G415": "solution of an ill-conditioned system",
+    "G416": "result of an approximate contact law",
     "G501": "file cut or of unknown format",
     "G601": "workers of a study are lost",
     "G602": "no cluster answers",

@@ -33,11 +33,11 @@ RESO = operator(
     "above MU about 1 one of several solutions ('UNIQ' looks for others). 'TRES': friction bound frozen, solved, "
     "updated; same solution, 4 to 20 times the cost; does not contract for large MU. 'MULT': multipliers and active"
     " set; same solution; no safeguard, statuses may cycle (G406). 'PENA' r: springs; the error is about 1/r (r = "
-    "1E4 gives 4 digits, r < 1 is wrong with a good residual), and the penetration is in the report. 'PERT' r: "
-    "perturbed Lagrangian, the same result. 'AUGM' r: augmented Lagrangian by Newton without safeguard; exact. "
-    "'UZAW' r: by updates of the multipliers; exact; where the steps of PENA or UZAW fail, they start again from the "
-    "exact solution, whose steps are not counted; UZAW takes 4 passes at r = 1000, 32 at r = 1, more than 400 at "
-    "r = 0.01. "
+    "1E4 gives 4 digits, r < 1 is wrong with a good residual); a result more than 1 % away from the exact laws comes with "
+    "a warning (G416) or, with 'RAPP', is measured there. 'PERT' r: perturbed Lagrangian, the same result. 'AUGM' r: augmented Lagrangian by Newton without safeguard; exact. "
+    "'UZAW' r: by updates of the multipliers; exact; 4 passes at r = 1000, 32 at r = 1, more than 400 at r = 0.01; each "
+    "pass is a problem of PENA. PENA, PERT, AUGM and UZAW have no help but damped steps of their own: with weak friction "
+    "(MU below 0.1) on a contact that opens they may not converge, and say so (1119). "
     "'PROJ': projected Gauss-Seidel; exact to 1E-8; tens to thousands of sweeps, no factorisation: an independent "
     "check. 'PCG': projected conjugate gradients, contact without friction only. 'BIPO' r: bipotential; exact to "
     "1E-8; 40 iterations at r = 1, in proportion more on both sides; Coulomb's law only. 'STATUT' (Sn (St (tol))): "
@@ -45,10 +45,15 @@ RESO = operator(
     "keeps an error of its own. Sn is the penetration from which a node closes; with St above 0 nodes inside the "
     "cone are held, and a sliding node sticks again when its slip is below St: this cycles when St is of the order "
     "of the slip. 'TOLE' x and 'ITMA' n change the tolerance (relative residual) and the largest number of "
-    "iterations. 'HIST' U0: slip counts from the solution U0 of the load step before. 'DEPA' U1: start of the "
-    "iterations. 'RAPP' T fills a table: CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION, "
-    "CONE, PUISSANCE, EQUILIBRE, DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE, HISTOIRE, "
-    "MESSAGE. 'SOUC' turns a failure to converge into a warning and gives the best iterate; with 'RAPP' "
+    "iterations; a result that breaks the exact laws by more than 1.E-5 (a hundred times TOLE if larger) is never called "
+    "converged, but for PENA, PERT and STATUT, which obey laws of their own. 'HIST' U0: slip counts from the solution U0 of the load step before. 'DEPA' U1: start of the "
+    "iterations. 'RAPP' T fills a table: CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION "
+    "and GLISSEMENT (slip of a node inside the cone), over the natural length of the interface, CONE (force outside the "
+    "cone over the largest bound), PUISSANCE (friction that does not oppose slip, force on an open node, over the energy), "
+    "EQUILIBRE, EXACT (VRAI when all of them are below 1.E-5), ECART for PENA, PERT and STATUT (differences of "
+    "displacement and of force from 'NEWT', relative), DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE "
+    "and AUTRES (statuses of the other solutions) with 'UNIQ', CONDITION with 'NCON' (of the matrix of the method: whole "
+    "model for PENA and UZAW, interface for the others), HISTOIRE, MESSAGE. 'SOUC' turns a failure to converge into a warning and gives the best iterate; with 'RAPP' "
     "the table says it (CONVERGE, MESSAGE) in place of the warning.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
@@ -82,6 +87,7 @@ RESO = operator(
     Key("TOLE", "tolerance of the contact iterations", Arg("x", FLOTTANT)),
     Key("ITMA", "largest number of contact iterations", Arg("n", ENTIER)),
     Key("UNIQ", "look for other solutions"),
+    Key("NCON", "condition number of the matrix of the method"),
     Key("SOUC", "unconverged contact is a warning"),
     Key("NOUN", "unilateral conditions are equalities"),
     Key("NOID", "ignore what the matrix does not know"),
@@ -101,6 +107,7 @@ def _reso(
     tole: float | None,
     itma: int | None,
     uniq: bool,
+    ncon: bool,
     souc: bool,
     noun: bool,
     noid: bool,
@@ -109,7 +116,7 @@ def _reso(
     loads = [system.load(ctx, field, lenient=noid) for field in f]
     if system.contacts or system.stops.shape[0]:
         chosen = _method(ctx, method, with_r, statuses, tole, itma)
-        wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq)
+        wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq, ncon)
         return tuple(solve_contact(ctx, k, system, *pair, wishes) for pair in zip(f, loads, strict=True))
     return tuple(solve_linear(ctx, k, system, loads, prec))
 

@@ -6,10 +6,12 @@ from two_blocks import blocks, load_push
 
 from gibiane_ops.kernels.contact.augmented import solve_augmented_newton, solve_uzawa
 from gibiane_ops.kernels.contact.bipotential import solve_bipotential
+from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring_condition
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.multipliers import solve_multipliers
 from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.outcome import accepted
 from gibiane_ops.kernels.contact.penalty import solve_penalty
 from gibiane_ops.kernels.contact.projected_cg import solve_projected_cg
 from gibiane_ops.kernels.contact.report import STICK
@@ -85,11 +87,77 @@ def test_penalty_errors(g):
     assert found.report.penetration > 0
 
 
-@pytest.mark.parametrize("g", [1e-2, 1.0, 1e2, 1e6])
+@pytest.mark.parametrize("mu", [0.001, 0.01, 0.1, 1.0])
 @pytest.mark.parametrize("scene", ["T1_1h", "T1_2h", "T4_2h"])
-def test_penalty_on_an_opening_contact_with_weak_friction(scene, g):
-    found = solve_penalty(blocks(scene).interface, 0.01, g)
-    assert found.report.balance < 1e-8
+def test_penalty_on_an_opening_contact_converges_by_its_own_steps_or_says_so(scene, mu):
+    # full steps and damped ones may both go round in circles: nothing borrowed from another method hides it
+    interface, outcomes = blocks(scene).interface, []
+    for g in 10.0 ** np.arange(-2, 7, 2):
+        try:
+            found = solve_penalty(interface, mu, g)
+        except NotConverged as failure:
+            outcomes.append(False)
+            assert len(failure.history) > 60 or scene == "T4_2h"
+            assert failure.best.report.worst > 1e-9
+        else:
+            outcomes.append(True)
+            assert found.report.balance < 1e-8
+            # normal forces are those of the springs at the penetration found
+            push = -g * interface.kref * np.maximum(found.w[:, 0] - interface.gap, 0.0)
+            np.testing.assert_allclose(found.r[:, 0], push, atol=1e-7 * interface.force_scale)
+    assert any(outcomes) or mu == 0.001
+    if (scene, mu) == ("T1_1h", 0.01):
+        assert not all(outcomes)
+
+
+@pytest.mark.parametrize("method", ["penalty", "uzawa"])
+def test_weak_friction_on_an_opening_contact_defeats_a_stiff_penalty(method):
+    solve = solve_penalty if method == "penalty" else solve_uzawa
+    with pytest.raises(NotConverged) as caught:
+        solve(blocks("T1_1h").interface, 0.01, 1e4)
+    assert caught.value.history[-1] > 1e-3
+
+
+# condition number of K + g C^T C, for g / kref on T1, h = 12.5 mm
+CONDITION = {1e-3: 4e5, 1e-1: 6e3, 1.0: 4e3, 10.0: 6e3, 1e2: 5e4, 1e4: 4e6, 1e6: 4e8, 1e8: 4e10}
+
+
+def springs_of(scene):
+    """Product by K and springs on every pair, and interface of a load without gap."""
+    slave, master = scene.pairs.pairs.T
+    free = np.ones(len(scene.F))
+    free[scene.reduction.fixed] = 0
+
+    def apply(u, stiffness):
+        u = free * np.ravel(u)
+        relative = stiffness * (u.reshape(-1, 3)[slave] - u.reshape(-1, 3)[master])
+        forces = (scene.K @ u).reshape(-1, 3)
+        np.add.at(forces, slave, relative)
+        np.add.at(forces, master, -relative)
+        return free * forces.ravel()
+
+    return apply, lambda F: scene.tied.interface(F, np.zeros(len(F)))
+
+
+@pytest.mark.parametrize("g", CONDITION)
+def test_conditioning_of_the_penalty(g):
+    scene = blocks("T1_2")
+    apply, condensed = springs_of(scene)
+    exact = solve_coulomb(scene.interface, 0.2)
+    stiffness = g * scene.interface.kref
+    found = spring_condition(scene.interface, exact, g, lambda u: apply(u, stiffness), condensed, len(scene.F))
+    assert CONDITION[g] / 2 < found < 2 * CONDITION[g]
+
+
+def test_matrices_on_the_interface():
+    interface = blocks("T1_2").interface
+    exact = solve_coulomb(interface, 0.2)
+    shifted = [condensed_condition(interface, exact, "shifted", r) for r in (1e-4, 1.0, 1e4)]
+    assert shifted[0] > 1e3
+    assert shifted[2] == pytest.approx(1, abs=1e-2)
+    # a springy saddle-point system is better conditioned than the springs, which is why it exists
+    assert condensed_condition(interface, exact, "saddle", 1.0) < 1e3
+    assert condensed_condition(interface, exact, "newton", 1.0) < 1e3
 
 
 def test_penalty_error_is_inverse_to_the_penalty():
@@ -117,6 +185,23 @@ def test_uzawa_with_a_small_penalty_says_that_it_did_not_converge():
         solve_uzawa(blocks("T1_2").interface, 0.2, 0.01)
     assert len(caught.value.history) == 400
     assert caught.value.best.report.worst > 1e-5
+
+
+@pytest.mark.parametrize("scene", ["T1_2", "T1_2h"])
+def test_uzawa_with_a_tiny_penalty_does_not_mistake_small_updates_for_convergence(scene):
+    # with r = 1E-5 the multipliers hardly move, far from the solution: the change alone would say converged at once
+    with pytest.raises(NotConverged) as caught:
+        solve_uzawa(blocks(scene).interface, 0.2, 1e-5, tolerance=1e-4, max_iter=20)
+    assert caught.value.best.report.worst > 1e-2
+
+
+def test_a_state_that_breaks_the_laws_is_refused():
+    interface = blocks("T1_2").interface
+    exact, springy = solve_coulomb(interface, 0.2), solve_penalty(interface, 0.2, 100.0)
+    assert accepted(exact, None) is exact
+    with pytest.raises(NotConverged) as caught:
+        accepted(springy, None)
+    assert caught.value.best is springy
 
 
 def test_tresca_contracts_more_slowly_with_more_friction():

@@ -135,13 +135,17 @@ class NotConverged(KernelError):
         Residual after each iteration.
     best : object
         The best iterate, so that the caller may accept, retry or report.
+    reason : str
+        What stopped the iteration, when it is not their number.
     """
 
     history: list[float]
     best: object = None
+    reason: str = ""
 
     def __str__(self) -> str:
         last = f", last residual {self.history[-1]:g}" if self.history else ""
+        last += f", {self.reason}" if self.reason else ""
         return f"no convergence after {len(self.history)} iterations{last}"
 
 

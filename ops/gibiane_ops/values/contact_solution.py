@@ -11,13 +11,14 @@ import scipy.sparse as sp
 from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import errors as k_errors
-from gibiane_ops.kernels.constraints import reduce_conditions
+from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
 from gibiane_ops.kernels.contact.condense import Condensation, condense
+from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring_condition
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import solve_tied
 from gibiane_ops.kernels.contact.pairs import facets_of_body
-from gibiane_ops.kernels.contact.report import STICK, ContactState, check_state
+from gibiane_ops.kernels.contact.report import OPEN, STICK, ContactState, check_state
 from gibiane_ops.kernels.contact.uniqueness import compare_starts
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.geometry import facet_normals
@@ -25,7 +26,7 @@ from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.methods import Method
 from gibiane_ops.values.nodes import FloatArray, IntArray
-from gibiane_ops.values.rapport import fill_report, success
+from gibiane_ops.values.rapport import TOLD, counted, departures, fill_report, success, tell_distance, tell_others
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.solving import check_held, kept, tell_notes
 from gibiane_ops.values.system import System
@@ -48,6 +49,8 @@ class Wishes:
         Contact surfaces are tied.
     compare : bool
         Look for other solutions.
+    conditioning : bool
+        Measure the matrix of the method.
     """
 
     method: Method
@@ -57,6 +60,7 @@ class Wishes:
     lenient: bool
     bonded: bool
     compare: bool
+    conditioning: bool
 
 
 def solve_contact(
@@ -112,6 +116,8 @@ def solve_contact(
     origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs.pairs, law, wishes.history)
     start = None if wishes.start is None else _start(system, interface, pairs.pairs, law, wishes.start)
     state = _run(ctx, system, interface, law, wishes, start, origin)
+    if wishes.conditioning and wishes.report is not None:
+        wishes.report.set("CONDITION", _condition(system, condensation, reduction, interface, state, wishes.method, origin))
     u = interface.expand(state.w)
     n = len(pairs.pairs)
     vector = interface.to_global(state.r)[:n]
@@ -156,18 +162,32 @@ def _run(
             ctx.warn(1119, "contact has not converged: {reason}", reason=message, at="k")
     if wishes.report is not None:
         _report(wishes.report, system, method, interface, state, converged, message)
+        if method.approximate and not wishes.bonded:
+            tell_distance(wishes.report, method, interface, state, origin)
+    elif converged and method.approximate and state.report.worst > TOLD:
+        ctx.warn(
+            "G416",
+            "the result obeys the law of method '{method}', not the exact one: {reason}",
+            at="k",
+            method=method.title,
+            reason=departures(state),
+            hint="'RAPP' T gives the distance; 'NEWT' is exact, a penalty is nearer with a larger r",
+        )
     if wishes.compare and converged:
         # an approximate method may be far from every solution: the exact one is what is unique or not
         exact = method.solve_exact(interface, law, origin) if method.approximate else state
         found = compare_starts(interface, law, exact, slip_origin=origin)
         if wishes.report is not None:
             wishes.report.set("UNIQUE", found.unique)
+            tell_others(wishes.report, found.others)
         if not found.unique:
             ctx.warn(
                 "G413",
-                "other solutions exist: another start of the iterations leads to forces that differ by {share} of the "
-                "largest",
+                "several solutions exist: the one returned has {here}; other starts of the iterations lead to {others}, "
+                "with forces that differ by {share} of the largest",
                 at="k",
+                here=counted(state),
+                others=" / ".join(dict.fromkeys(counted(other) for other in found.others)),
                 share=f"{found.difference:.2g}",
                 hint="large friction coefficients allow several equilibria; the one returned is that of the method",
             )
@@ -179,6 +199,38 @@ def _report(
 ) -> None:
     counts = [len(part.multipliers) for part in system.contacts]
     fill_report(table, method, interface, state, converged, text, counts)
+
+
+def _condition(
+    system: System,
+    condensation: Condensation,
+    reduction: Reduction,
+    interface: Interface,
+    state: ContactState,
+    method: Method,
+    origin: FloatArray | None,
+) -> float:
+    """Measure the matrix of a method: that of the whole model for springs, that of the interface for the others."""
+    r = 1.0 if method.r is None else method.r
+    if method.matrix != "springs":
+        return condensed_condition(interface, state, method.matrix, r, origin)
+    pairs = condensation.contact.pairs
+    C = sp.block_diag(list(interface.frames[: len(pairs)])) @ _held_rows(system, pairs)[: pairs.shape[0] * system.dim]
+    C = sp.csr_array(sp.vstack([C, *([system.stops] if system.stops.shape[0] else [])]))
+    d = interface.dim
+    kept = np.r_[np.arange(len(pairs) * d), len(pairs) * d + d * np.arange(system.stops.shape[0])]
+    closed = ((state.status != OPEN)[:, None] & interface.active).ravel()[kept]
+    springs = sp.diags_array(np.where(closed, r * interface.kref, 0.0))
+    n = system.K.shape[0]
+    nothing = np.zeros(n)
+    free = np.ones(n)
+    free[reduction.fixed] = 0.0
+
+    def apply(u: FloatArray) -> FloatArray:
+        v = free * np.ravel(u)
+        return np.asarray(free * (system.K @ v + C.T @ (springs @ (C @ v))))
+
+    return spring_condition(interface, state, r, apply, lambda F: condensation.interface(F, nothing), n)
 
 
 def _relative(system: System, interface: Interface, pairs: IntArray, u: ChPoint) -> FloatArray:
@@ -297,7 +349,8 @@ def _reason(failure: Any, interface: Interface) -> str:
     if isinstance(failure, k_errors.StatusCycle):
         return f"the statuses of {len(failure.pairs)} pairs come back every {failure.period} iterations"
     last = ", ".join(f"{x:.2g}" for x in failure.history[-3:])
-    return f"{len(failure.history)} iterations, last residuals {last}"
+    why = f", {failure.reason}" if failure.reason else ""
+    return f"{len(failure.history)} iterations, last residuals {last}{why}"
 
 
 def _fail(ctx: Context, failure: Any, reason: str, method: Method) -> NoReturn:

@@ -13,6 +13,7 @@ from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.multipliers import solve_multipliers
 from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.outcome import accepted
 from gibiane_ops.kernels.contact.penalty import solve_penalty
 from gibiane_ops.kernels.contact.projected_cg import solve_projected_cg
 from gibiane_ops.kernels.contact.report import ContactState
@@ -37,6 +38,11 @@ WITH_R = {
 }
 STATUSES = "STATUT"
 OWN_LAW = ("PENA", "PERT")
+
+_MATRICES = {
+    "PENA": "springs", "UZAW": "springs", "PERT": "perturbed", "MULT": "saddle", "BIPO": "shifted", "PROJ": "shifted",
+    "PCG": "shifted",
+}  # fmt: skip
 
 _SOLVERS: dict[str, Callable[..., ContactState]] = {
     "NEWT": solve_coulomb,
@@ -85,12 +91,20 @@ class Method:
         """Whether its result obeys another law than the exact one."""
         return self.name in (*OWN_LAW, STATUSES)
 
+    @property
+    def matrix(self) -> str:
+        """The matrix that it factorises, as ``condensed_condition`` names it, or ``springs``."""
+        return _MATRICES.get(self.name, "newton")
+
     def solve_exact(self, interface: Interface, law: Friction, slip_origin: FloatArray | None) -> ContactState:
         """Run the exact method instead."""
         return solve_coulomb(interface, law, slip_origin=slip_origin)
 
     def solve(self, interface: Interface, law: Friction, **more: Any) -> ContactState:
-        """Run the method; `more` holds `start` and `slip_origin` (those that the method knows are passed on)."""
+        """Run the method; `more` holds `start` and `slip_origin` (those that the method knows are passed on).
+
+        A result that breaks the exact laws is refused, unless the method obeys a law of its own.
+        """
         options: dict[str, Any] = {}
         if self.name == STATUSES:
             closing, sticking, tolerance = self.thresholds
@@ -105,4 +119,5 @@ class Method:
             options["max_iter"] = self.max_iter
         options = {name: value for name, value in options.items() if value is not None}
         given = () if self.r is None else (self.r,)
-        return _SOLVERS[self.name](interface, law, *given, **options)
+        state = _SOLVERS[self.name](interface, law, *given, **options)
+        return state if self.approximate else accepted(state, self.tolerance)

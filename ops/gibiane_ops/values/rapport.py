@@ -8,9 +8,15 @@ import numpy as np
 
 from gibiane.values import Table
 from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.contact.outcome import DEPARTURE
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState
+from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
 from gibiane_ops.values.listes import ListEnti, ListReel
 from gibiane_ops.values.methods import OWN_LAW, Method
+from gibiane_ops.values.nodes import FloatArray
+
+TOLD = 1e-2
+"""Departure from the exact laws, relative, from which an approximate result comes with a warning."""
 
 
 def fill_report(
@@ -27,6 +33,9 @@ def fill_report(
     `zones` holds the number of pairs of each zone, in order; stops come after them.
     """
     report = state.report
+    for index in ("ECART", "UNIQUE", "AUTRES", "CONDITION"):
+        if table.has(index):
+            table.remove(index)
     history = Table()
     history.set("RESIDU", ListReel(state.history))
     for index, value in {
@@ -36,8 +45,10 @@ def fill_report(
         "STATUTS": ListEnti([report.n_open, report.n_stick, report.n_slip]),
         "PENETRATION": float(report.penetration),
         "CONE": float(max(report.excess_friction, report.tension)),
+        "GLISSEMENT": float(report.inner_slip),
         "PUISSANCE": float(max(report.adhesion_power, abs(report.friction_power))),
         "EQUILIBRE": float(report.balance),
+        "EXACT": bool(report.worst <= max(DEPARTURE, 100 * (method.tolerance or 0.0))),
         "DISSIPATION": float(report.dissipation),
         "KREF": float(interface.kref),
         "ZONES": _zones(interface, state, zones),
@@ -50,16 +61,55 @@ def fill_report(
 def success(method: Method, state: ContactState) -> str:
     """Say what a converged method has converged to."""
     if method.name in OWN_LAW:
-        return (
-            f"converged to the law of the penalty r = {method.r:g}, not to the exact one: "
-            f"penetration {state.report.penetration:.2g} of the natural length of the interface"
-        )
+        return f"converged to the law of the penalty r = {method.r:g}, not to the exact one: {departures(state)}"
     if method.name == "STATUT":
-        return (
-            f"converged by its own criterion; departure from Coulomb's law {state.report.worst:.2g} "
-            "(nodes inside the cone are not held)"
-        )
+        return f"converged by its own criterion, not to the exact law: {departures(state)}"
     return "converged"
+
+
+def departures(state: ContactState) -> str:
+    """Word the departures of a state from the exact laws."""
+    report = state.report
+    parts = {
+        "penetration": report.penetration,
+        "slip inside the cone": report.inner_slip,
+        "force outside the cone": max(report.excess_friction, report.tension),
+        "power": max(report.adhesion_power, abs(report.friction_power)),
+    }
+    return ", ".join(f"{name} {value:.2g}" for name, value in parts.items() if value > 1e-3 * report.worst) or "none"
+
+
+def counted(state: ContactState) -> str:
+    """Word the statuses of a state."""
+    report = state.report
+    return f"{report.n_open} open, {report.n_stick} stick, {report.n_slip} slip"
+
+
+def tell_others(table: Table, others: Sequence[ContactState]) -> None:
+    """Put the statuses of other solutions into a report, as AUTRES, numbered from 1."""
+    found = Table()
+    for number, state in enumerate(others, 1):
+        report = state.report
+        found.set(number, ListEnti([report.n_open, report.n_stick, report.n_slip]))
+    table.set("AUTRES", found)
+
+
+def tell_distance(
+    table: Table, method: Method, interface: Interface, state: ContactState, slip_origin: FloatArray | None
+) -> None:
+    """Put the distance of an approximate result from the exact solution into its report.
+
+    ECART holds the largest differences of relative displacement, over the largest or over the natural length of the
+    interface, and of contact force, over the largest; it is absent when the exact method finds no solution.
+    """
+    try:
+        exact = method.solve_exact(interface, state.law, slip_origin)
+    except (NotConverged, ContactUnbalanced):
+        return
+    length = max(float(np.abs(exact.w).max(initial=0)), interface.length_scale) or 1.0
+    force = float(np.abs(exact.r).max(initial=0)) or interface.force_scale or 1.0
+    far = float(np.abs(state.w - exact.w).max(initial=0)) / length, float(np.abs(state.r - exact.r).max(initial=0)) / force
+    table.set("ECART", ListReel(list(far)))
 
 
 def _zones(interface: Interface, state: ContactState, counts: Sequence[int]) -> Table:

@@ -94,7 +94,8 @@ def solve_uzawa(
     r : float
         Penalty over ``interface.kref``.
     tolerance : float
-        Largest change of a multiplier over the largest condensed load.
+        Largest change of a multiplier over the largest condensed load; the residual of the exact equations must also
+        be below a hundred times as much, since the updates of a small r change little far from the solution.
     max_iter : int
         Updates of the multipliers.
     start : ContactState, optional
@@ -116,7 +117,8 @@ def solve_uzawa(
     -----
     Each pass solves the penalty problem with the multipliers as an added force, then takes the forces found as the
     new multipliers: ``lambda = law(lambda - g (w - gap n))``. The error falls by about 1 / (1 + r) a pass: a few passes
-    from r = 100 on, hundreds at r = 0.1, and no end below; there is no upper limit on a condensed interface.
+    from r = 100 on, hundreds at r = 0.1, and no end below; there is no upper limit on a condensed interface. A pass
+    whose inner problem is not solved ends the method, unconverged: see ``solve_penalty`` for where that happens.
 
     Source
     ------
@@ -134,20 +136,23 @@ def solve_uzawa(
     now = sprung(problem, start)
     if start is not None:
         problem = replace(problem, multiplier=now[1])
+    exact = Problem.of(interface, law, 1.0, slip_origin)
     history: list[float] = []
-    converged = False
+    converged, reason = False, ""
     for _ in range(max_iter):
         inner: list[float] = []
         # the inner residual adds to the error of the multipliers: keep it well below
         accuracy = min(1e-10, 0.01 * tolerance)
-        found = penalty_steps(interface, law, problem, now, accuracy, 60, inner, slip_origin)
+        found = penalty_steps(problem, now, accuracy, 60, inner)
         now = found.w, found.r
         history.append(float(np.abs(found.r - problem.multiplier).max(initial=0)))
         problem = replace(problem, multiplier=found.r)
-        if history[-1] <= tolerance or not found.converged:
-            converged = found.converged
+        converged = history[-1] <= tolerance and exact.merit(*now) <= 100 * tolerance
+        if converged or not found.converged:
+            converged = converged and found.converged
+            if not found.converged:
+                reason = f"the penalty problem of pass {len(history)} is not solved in {len(inner)} steps"
             break
-    exact = Problem.of(interface, law, 1.0, slip_origin)
     status = exact.project(exact.augmented(*now))[1]
     state = physical_state(interface, law, problem, *now, status, history, slip_origin)
-    return finished(interface, state, converged)
+    return finished(interface, state, converged, reason)

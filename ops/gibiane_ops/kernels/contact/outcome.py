@@ -14,6 +14,9 @@ from gibiane_ops.kernels.errors import NotConverged
 PATIENCE = 500
 """Iterations of a slow method after which the load is checked: what no contact force balances needs no more."""
 
+DEPARTURE = 1e-5
+"""Departure from the exact laws, relative, above which a state is no solution of them."""
+
 
 def physical_state(
     interface: Interface,
@@ -49,7 +52,7 @@ def physical_state(
     return check_state(interface, w, r * problem.force, status, law, history, slip_origin, bonded=problem.bonded)
 
 
-def finished(interface: Interface, state: ContactState, converged: bool) -> ContactState:
+def finished(interface: Interface, state: ContactState, converged: bool, reason: str = "") -> ContactState:
     """Return a converged state; otherwise raise the error that explains the failure.
 
     Parameters
@@ -57,6 +60,8 @@ def finished(interface: Interface, state: ContactState, converged: bool) -> Cont
     interface : Interface
     state : ContactState
     converged : bool
+    reason : str
+        What stopped the method.
 
     Returns
     -------
@@ -71,5 +76,29 @@ def finished(interface: Interface, state: ContactState, converged: bool) -> Cont
     """
     if not converged:
         raise_if_unbalanced(interface, state)
-        raise NotConverged(state.history, state)
+        raise NotConverged(state.history, state, reason)
+    return state
+
+
+def accepted(state: ContactState, tolerance: float | None) -> ContactState:
+    """Return a state that obeys the exact laws, whatever the criterion on which its method stopped.
+
+    Parameters
+    ----------
+    state : ContactState
+        Called converged by a method that solves the exact problem.
+    tolerance : float or None
+        Of the method.
+
+    Returns
+    -------
+    ContactState
+
+    Raises
+    ------
+    NotConverged
+        When a departure exceeds ``DEPARTURE``, or a hundred times the tolerance if this is more.
+    """
+    if not state.report.worst <= max(DEPARTURE, 100 * (tolerance or 0.0)):
+        raise NotConverged(state.history, state, f"the laws are broken by {state.report.worst:.2g}")
     return state

@@ -7,11 +7,11 @@ import numpy as np
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import Iterate, first_guess, newton_steps, robust_steps, solve_coulomb
+from gibiane_ops.kernels.contact.newton import Iterate, first_guess, newton_steps
 from gibiane_ops.kernels.contact.outcome import finished, physical_state
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState
-from gibiane_ops.kernels.errors import BadValue, ContactUnbalanced, NotConverged
+from gibiane_ops.kernels.errors import BadValue
 
 
 def solve_penalty(
@@ -35,14 +35,16 @@ def solve_penalty(
     tolerance : float
         Largest residual of the penalised equations over the largest condensed load.
     max_iter : int
-        Newton steps of one attempt.
+        Newton steps of one attempt: full ones, then damped ones from the same start.
     start : ContactState, optional
+        The springs carry its forces, or those of tied bodies that are compressed.
     slip_origin : (n, d - 1) float64, optional
 
     Returns
     -------
     ContactState
         Converged to the penalty law; ``report`` measures it against the exact law, which it breaks by a penetration.
+        ``history`` holds every step made.
 
     Raises
     ------
@@ -55,8 +57,8 @@ def solve_penalty(
     ``r = law(-g (w - gap n))``: normal force ``-g`` times the penetration, tangential force ``-g w_t`` cut at the
     bound. The error of displacements and forces is proportional to 1/g; the conditioning of the unreduced matrix
     ``K + g C^T C`` grows like g, which on the condensed interface costs nothing: 1e4 to 1e6 leave 4 to 6 digits. A g
-    below 1 gives a wrong answer with an excellent residual. Where full steps fail, on opening contact with weak
-    friction, they start again from the exact solution.
+    below 1 gives a wrong answer with an excellent residual. Where friction is weak and the contact opens, both kinds of
+    steps may go round in circles: nothing else is tried, and the method says that it has not converged.
 
     Source
     ------
@@ -71,36 +73,30 @@ def solve_penalty(
     check_stiffness(stiffness)
     problem = Problem.of(interface, law, stiffness, slip_origin, penalty=True)
     history: list[float] = []
-    found = penalty_steps(interface, law, problem, sprung(problem, start), tolerance, max_iter, history, slip_origin)
+    found = penalty_steps(problem, sprung(problem, start), tolerance, max_iter, history)
     state = physical_state(interface, law, problem, found.w, found.r, found.status, history, slip_origin)
     return finished(interface, state, found.converged)
 
 
 def penalty_steps(
-    interface: Interface,
-    law: Friction,
     problem: Problem,
     first: tuple[FloatArray, FloatArray],
     tolerance: float,
     max_iter: int,
     history: list[float],
-    slip_origin: FloatArray | None,
 ) -> Iterate:
-    """Solve a penalised problem: full steps, then again from the exact solution, then damped steps.
+    """Solve a penalised problem by full Newton steps, then by damped ones from the same start.
 
     Parameters
     ----------
-    interface : Interface
-    law : Friction
-        In physical units.
     problem : Problem
         With ``penalty``.
     first : tuple of (n, d) float64
     tolerance : float
     max_iter : int
+        Steps of each attempt.
     history : list of float
-        Grows by one residual a step, those of the exact solution not counted.
-    slip_origin : (n, d - 1) float64 or None
+        Grows by one residual a step, those of both attempts.
 
     Returns
     -------
@@ -109,14 +105,7 @@ def penalty_steps(
     found = newton_steps(problem, first, tolerance, max_iter, history)[0]
     if found.converged:
         return found
-    try:
-        exact = solve_coulomb(interface, law, slip_origin=slip_origin)
-    except (ContactUnbalanced, NotConverged):
-        return found
-    w, r = exact.w / problem.length, exact.r / problem.force
-    near = w + (problem.multiplier - r) / problem.gamma, r
-    found = found.better(newton_steps(problem, near, tolerance, max_iter, history)[0])
-    return found if found.converged else found.better(robust_steps(problem, first, tolerance, max_iter, history))
+    return found.better(newton_steps(problem, first, tolerance, max_iter, history, damped=True)[0])
 
 
 def check_stiffness(r: float) -> None:

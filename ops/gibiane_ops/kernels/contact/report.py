@@ -26,6 +26,8 @@ class ContactReport:
         Largest tensile normal force over the largest force.
     excess_friction : float
         Largest ``abs(r_t) - mu abs(r_n)`` over the largest ``mu abs(r_n)``, at least a millionth of the largest force.
+    inner_slip : float
+        Largest ``abs(w_t) (1 - abs(r_t) / bound)`` over the natural length: a pair that slides inside the cone.
     adhesion_power : float
         ``sum abs(r_n (w_n - gap))`` over ``scale``: a pair that is open and loaded.
     friction_power : float
@@ -40,6 +42,7 @@ class ContactReport:
     penetration: float
     tension: float
     excess_friction: float
+    inner_slip: float
     adhesion_power: float
     friction_power: float
     balance: float
@@ -52,8 +55,8 @@ class ContactReport:
     def worst(self) -> float:
         """Largest departure from a law or from equilibrium."""
         return max(
-            self.penetration, self.tension, self.excess_friction, self.adhesion_power, abs(self.friction_power),
-            self.balance,
+            self.penetration, self.tension, self.excess_friction, self.inner_slip, self.adhesion_power,
+            abs(self.friction_power), self.balance,
         )  # fmt: skip
 
 
@@ -130,10 +133,13 @@ def check_state(
     # without compression, or nearly without friction, the bound itself is round-off
     friction = max(float(finite.max(initial=0)), 1e-6 * force)
     holds = interface.active[:, 0]
+    spare = np.where(limited, finite - norms(r[:, 1:]), np.inf)
+    spare = np.clip(spare / np.maximum(finite, 1e-6 * force), 0.0, 1.0)
     report = ContactReport(
         penetration=float((-apart[holds]).max(initial=0)) / length,
         tension=float((r[:, 0] - allowed).max(initial=0)) / force,
         excess_friction=float((norms(r[:, 1:]) - bound)[limited].max(initial=0)) / friction,
+        inner_slip=float((spare * norms(slip))[holds & law.rubs & (law.exponent == 0)].max(initial=0)) / length,
         adhesion_power=float(np.abs(r[holds, 0] * opening[holds]).sum()) / (force * length),
         friction_power=float((finite * norms(slip) + power)[limited].sum()) / (force * length),
         balance=float(np.abs(equilibrium).max(initial=0)) / force,
