@@ -117,7 +117,9 @@ def solve_contact(
     start = None if wishes.start is None else _start(system, interface, pairs.pairs, law, wishes.start)
     state = _run(ctx, system, interface, law, wishes, start, origin)
     if wishes.conditioning and wishes.report is not None:
-        wishes.report.set("CONDITION", _condition(system, condensation, reduction, interface, state, wishes.method, origin))
+        wishes.report.set(
+            "CONDITION", _condition(system, condensation, reduction, interface, state, wishes.method, origin)
+        )
     u = interface.expand(state.w)
     n = len(pairs.pairs)
     vector = interface.to_global(state.r)[:n]
@@ -183,8 +185,8 @@ def _run(
         if not found.unique:
             ctx.warn(
                 "G413",
-                "several solutions exist: the one returned has {here}; other starts of the iterations lead to {others}, "
-                "with forces that differ by {share} of the largest",
+                "several solutions exist: the one returned has {here}; other starts of the iterations lead to "
+                "{others}, with forces that differ by {share} of the largest",
                 at="k",
                 here=counted(state),
                 others=" / ".join(dict.fromkeys(counted(other) for other in found.others)),

@@ -108,7 +108,10 @@ def tell_distance(
         return
     length = max(float(np.abs(exact.w).max(initial=0)), interface.length_scale) or 1.0
     force = float(np.abs(exact.r).max(initial=0)) or interface.force_scale or 1.0
-    far = float(np.abs(state.w - exact.w).max(initial=0)) / length, float(np.abs(state.r - exact.r).max(initial=0)) / force
+    far = (
+        float(np.abs(state.w - exact.w).max(initial=0)) / length,
+        float(np.abs(state.r - exact.r).max(initial=0)) / force,
+    )
     table.set("ECART", ListReel(list(far)))
 
 
