@@ -102,9 +102,9 @@ def condensed_condition(
     w, forces = state.w / problem.length, state.r / problem.force
     n, d = w.shape
     size = n * d
-    P = np.zeros((n, d, n, d))
-    P[np.arange(n), :, np.arange(n)] = problem.derivative(problem.augmented(w, forces))
-    P = P.reshape(size, size)
+    blocks = np.zeros((n, d, n, d))
+    blocks[np.arange(n), :, np.arange(n)] = problem.derivative(problem.augmented(w, forces))
+    P = blocks.reshape(size, size)
     S, unit = problem.S_newton, np.eye(size)
     if method == "newton":
         A = (unit - P) @ S + r * P
