@@ -101,6 +101,7 @@ MECHANICS = {
     "the nodes of the slave surface have changed since MATE: make the material again": "les noeuds de la surface esclave ont changé depuis MATE : refaire le matériau",
     "several solutions exist: the one returned has {here}; other starts of the iterations lead to {others}, with forces that differ by {share} of the largest": "plusieurs solutions existent : celle qui est rendue a {here} ; d'autres départs des itérations mènent à {others}, avec des forces qui diffèrent de {share} de la plus grande",
     "the result obeys the law of method '{method}', not the exact one: {reason}": "le résultat obéit à la loi de la méthode '{method}', pas à la loi exacte : {reason}",
+    "'RAPP' T gives the distance; 'NEWT' is exact, a penalty is nearer with a larger r": "'RAPP' T donne la distance ; 'NEWT' est exacte, une pénalité est plus proche avec un r plus grand",
     "large friction coefficients allow several equilibria; the one returned is that of the method": "de grands coefficients de frottement permettent plusieurs équilibres ; celui rendu est celui de la méthode",
     "the solution given by 'HIST' holds no forces of these contact conditions, which elastic slip needs": "la solution donnée par 'HIST' n'a pas les forces de ces conditions de contact, nécessaires au glissement élastique",
     "keep one result of RIGI MC MATC for all load steps": "garder un seul résultat de RIGI MC MATC pour tous les pas",
