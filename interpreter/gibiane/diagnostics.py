@@ -24,6 +24,7 @@ LEVELS: dict[str, int] = {
     "G413": WARNING,
     "G415": WARNING,
     "G416": WARNING,
+    "G417": WARNING,
     "G900": FATAL,
 }
 G_CODES = {
@@ -49,6 +50,7 @@ G_CODES = {
     "G414": "too large for the memory",
     "G415": "solution of an ill-conditioned system",
     "G416": "result of an approximate contact law",
+    "G417": "slips beyond the facets of the start",
     "G501": "file cut or of unknown format",
     "G601": "workers of a study are lost",
     "G602": "no cluster answers",

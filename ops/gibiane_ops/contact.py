@@ -52,10 +52,11 @@ def _cofr(ctx: Context, mc: Modele, u: ChPoint, rea: ChPoint, matc: MChaml | Non
         in_space = np.einsum("nij,ni->nj", zone.frames, zone.force)
         R = densities(store.coords[:, :dim], zone.zone.slave.kernel_blocks, nodes, in_space, lumped=lump)
         local = np.einsum("nij,nj->ni", zone.frames, R)
-        scale = np.abs(zone.force).max(initial=0.0)
-        slip = np.linalg.norm(zone.relative[:, 1:], axis=1)
-        closed = -zone.force[:, 0] > 1e-9 * scale
-        moving = slip > 1e-9 * np.abs(zone.relative).max(initial=0.0)
+        scale = np.abs(zone.pair_force).max(initial=0.0)
+        slip = np.linalg.norm(zone.pair_relative[:, 1:], axis=1)
+        closed = -zone.pair_force[:, 0] > 1e-9 * scale
+        # what the surfaces move together measures the round-off of what they slip
+        moving = slip > 1e-9 * max(np.abs(zone.pair_relative).max(initial=0.0), zone.motion)
         status = np.where(closed, np.where(moving, 2.0, 1.0), 0.0)
         values = {
             "PN": -local[:, 0],

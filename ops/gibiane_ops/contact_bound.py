@@ -103,6 +103,14 @@ def _tractions(
             wanted=name,
             hint="the contact surfaces of solids in tetrahedra are triangles",
         )
+    if not state.pairs.plain.all():
+        ctx.fail(
+            251,
+            "contact tractions in balance need surfaces whose nodes coincide; these have different meshes",
+            at="mc",
+            hint="mesh the contact surface once and copy it for the other solid; ERREUR 'CONTACT' without 'RDC' "
+            "estimates the error on any meshes",
+        )
     slave, master = state.pairs.pairs.T
     known = held_directions(store, supports, DISPLACEMENT[:dim], dim)
     # A support holds an axis of both nodes of a pair; an obstacle (-1) needs no balance of its own.

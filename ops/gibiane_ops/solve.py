@@ -10,9 +10,11 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, RIGIDITE, TABLE, Table
 from gibiane_ops.values.champs import DISCRET, ChPoint
+from gibiane_ops.values.conditions import family
 from gibiane_ops.values.contact_solution import Wishes, solve_contact
 from gibiane_ops.values.linear import solve_linear
 from gibiane_ops.values.methods import PLAIN, STATUSES, WITH_R, Method
+from gibiane_ops.values.modele import FORCES
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.system import build
@@ -186,11 +188,13 @@ def _reac(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
             chosen = part.name == name
             terms.setdefault("F" + str(name)[1:], []).append((nodes[chosen], force[chosen]))
     for contact in k.contacts:
-        slave, master = store.canonical(np.maximum(contact.pairs.pairs, 0)).T
-        solid = contact.pairs.pairs[:, 1] >= 0
-        for axis in "XYZ"[: contact.pairs.normals.shape[1]]:
-            force = u.at("LX", contact.vectors[:, "XYZ".index(axis)])
-            terms.setdefault("F" + axis, []).extend([(slave, force), (master[solid], -force[solid])])
+        nodes = np.arange(store.count)
+        names = FORCES[family(ctx)]
+        spread = contact.pairs.matrix(store.count).T
+        used = np.flatnonzero(np.diff(spread.tocsr().indptr))
+        for i, name in enumerate(names[: contact.pairs.normals.shape[1]]):
+            force = spread @ u.at("LX", contact.vectors[:, i])
+            terms.setdefault(name, []).append((store.canonical(nodes[used]), force[used]))
     parts = {}
     for name, pieces in terms.items():
         nodes, inverse = np.unique(np.concatenate([n for n, _ in pieces]), return_inverse=True)

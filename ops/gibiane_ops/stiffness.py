@@ -12,7 +12,7 @@ from gibiane.values import MCHAML, MMODEL, RIGIDITE
 from gibiane_ops.kernels import assembly
 from gibiane_ops.values import mechanics
 from gibiane_ops.values.champs import ChPoint, MChaml
-from gibiane_ops.values.contact import NEEDS, nodal_property, warn_unpaired, zone_friction, zone_pairs
+from gibiane_ops.values.contact import NEEDS, warn_unpaired, zone_friction, zone_gap, zone_pairs
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
@@ -67,14 +67,12 @@ def _contact(ctx: Context, model: Modele, material: MChaml | None) -> Any:
             raise ctx.operands.missing(MCHAML, f"the material of the contact (MATE MC '{NEEDS[zone.law][0]}' ...)")
         pairs = zone_pairs(ctx, zone, at="model")
         warn_unpaired(ctx, zone, pairs, at="model")
-        nodes = pairs.pairs[:, 0]
-        gap = nodal_property(ctx, values, "JEU", nodes)
         multipliers = store.add(pairs.points)
         d = pairs.normals.shape[1]
         vectors = store.add(np.repeat(pairs.points, d, axis=0)).reshape(-1, d)
         with worded(ctx, at="material"):
-            parts.append(ContactPart(zone, pairs, zone_friction(ctx, zone, values, nodes), multipliers, vectors))
-        gaps.append((multipliers, pairs.gap if gap is None else gap))
+            parts.append(ContactPart(zone, pairs, zone_friction(ctx, zone, values, pairs), multipliers, vectors))
+        gaps.append((multipliers, zone_gap(ctx, zone, values, pairs)))
     nodes = np.concatenate([n for n, _ in gaps])
     values_of_gaps = np.concatenate([g for _, g in gaps])
     return Rigidite(parts), ChPoint(store, {"FLX": (nodes, values_of_gaps)}, "DISCRET")

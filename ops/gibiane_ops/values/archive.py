@@ -35,7 +35,7 @@ NODES = {
     "MatrixPart": ("nodes",),
     "ConditionPart": ("node", "multipliers"),
     "ContactPart": ("multipliers", "vectors"),
-    "ContactPairs": ("pairs", "unpaired_slave", "unpaired_master"),
+    "ContactPairs": ("pairs", "unpaired_slave", "unpaired_master", "node"),
 }
 # Language objects rebuilt from their text.
 TEXTS = {"Texte": Texte, "Procedure": Procedure}

@@ -5,21 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from gibiane.registry import Context
 from gibiane_ops.kernels import errors as k_errors
-from gibiane_ops.kernels.contact.areas import nodal_areas
 from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.law import Friction, friction
+from gibiane_ops.kernels.contact.mortar import mortar_pairs
+from gibiane_ops.kernels.contact.node_facet import node_facet_pairs
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
-from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs
+from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs, with_surface
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
+from gibiane_ops.values.conditions import family
 from gibiane_ops.values.failures import worded
-from gibiane_ops.values.modele import ContactZone, Modele
+from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, ContactZone, Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
 DISPLACEMENT = ("UX", "UY", "UZ")
-FORCE = ("FX", "FY", "FZ")
 
 # Properties of MATE that each law needs, those that it may have, and their ranges: low, low excluded, high.
 NEEDS: dict[str, tuple[str, ...]] = {
@@ -46,6 +48,9 @@ RANGES = {
     "VREF": (0.0, True, np.inf),
     "JEU": (-np.inf, False, np.inf),
 }
+LOCKING = ("SYME", "FAIB")
+"""Kinematics whose conditions are not independent on meshes that differ."""
+
 _REACH = 0.45
 """Largest gap that pairs of nodes may bridge, over the shortest edge of the slave surface."""
 
@@ -56,9 +61,14 @@ _OFFSET = 0.05
 def zone_pairs(ctx: Context, zone: ContactZone, at: str) -> ContactPairs:
     """Return the pairs of a contact zone in nodes of the session (G401, G402 when there are none)."""
     points = node_store(ctx).coords[:, : int(ctx.option("DIME"))]
-    slave, master = zone.slave.kernel_blocks, zone.master.kernel_blocks
+    axis = family(ctx) == "AXIS"
     with worded(ctx, at=at):
-        pairs = obstacle_pairs(points, slave, master) if zone.rigid else _node_pairs(points, zone)
+        try:
+            pairs = _pairs(ctx, points, zone, axis, at)
+        except k_errors.EmptyContact:
+            if zone.rigid:
+                raise
+            pairs = _looking_away(points, zone)
     if len(pairs.not_facing):
         ctx.fail(
             "G402",
@@ -74,7 +84,7 @@ def zone_pairs(ctx: Context, zone: ContactZone, at: str) -> ContactPairs:
 def warn_unpaired(ctx: Context, zone: ContactZone, pairs: ContactPairs, at: str) -> None:
     """Say how many nodes of the smaller surface have no partner (G401); past the border of an obstacle it is normal."""
     lost = min(len(pairs.unpaired_slave), len(pairs.unpaired_master))
-    if lost and not zone.rigid:
+    if lost and not zone.rigid and zone.kinematics == "NOEU":
         ctx.warn(
             "G401",
             "{count} nodes of the smaller surface have no partner and stay free of contact",
@@ -83,18 +93,58 @@ def warn_unpaired(ctx: Context, zone: ContactZone, pairs: ContactPairs, at: str)
         )
 
 
-def _node_pairs(points: FloatArray, zone: ContactZone) -> ContactPairs:
-    """Pair coincident nodes, and those left on both sides that face each other across less than half an edge."""
+def _pairs(ctx: Context, points: FloatArray, zone: ContactZone, axis: bool, at: str) -> ContactPairs:
+    """Pair coincident nodes where the surfaces have them, else interpolate as the kinematics of the zone say."""
+    slave, master = zone.slave.kernel_blocks, zone.master.kernel_blocks
+    if zone.rigid:
+        if zone.kinematics == "MORT":
+            return mortar_pairs(points, slave, master, rigid=True, axisymmetric=axis)
+        return with_surface(obstacle_pairs(points, slave, master), points, slave, axis)
+    pairs = _node_pairs(points, zone, axis)
+    if pairs is not None:
+        return pairs
+    if zone.kinematics in LOCKING:
+        ctx.fail(
+            251,
+            "'{word}' goes with coincident nodes only: between different meshes its conditions outnumber the motions "
+            "of the surfaces, which lock",
+            at=at,
+            word=zone.kinematics,
+            hint="'MORT' holds the mean gap about each node, and is exact for a uniform pressure",
+        )
+    if zone.kinematics == "MORT":
+        return mortar_pairs(points, slave, master, axisymmetric=axis)
+    return node_facet_pairs(points, slave, master, axisymmetric=axis)
+
+
+def _looking_away(points: FloatArray, zone: ContactZone) -> ContactPairs:
+    """Find the pairs of surfaces that look the same way, to tell that from surfaces that are elsewhere."""
+    found = node_facet_pairs(points, zone.slave.kernel_blocks, zone.master.kernel_blocks, facing=False)
+    near = np.abs(found.gap) <= found.size
+    if not near[found.not_facing].any():
+        raise k_errors.EmptyContact("no part of one surface lies in front of the other")
+    return found
+
+
+def _node_pairs(points: FloatArray, zone: ContactZone, axis: bool) -> ContactPairs | None:
+    """Pair coincident nodes, and those left on both sides that face each other across less than half an edge.
+
+    None when nodes of both surfaces stay alone, unless pairs are asked for.
+    """
     slave, master = zone.slave.kernel_blocks, zone.master.kernel_blocks
     edges = [np.linalg.norm(points[c] - points[np.roll(c, 1, axis=1)], axis=2).min() for _, c in slave if len(c)]
     edge = float(min(edges, default=0.0))
-    try:
-        close = node_pairs(points, slave, master)
-    except k_errors.EmptyContact:
-        return node_pairs(points, slave, master, tolerance=_REACH * edge, offset=_OFFSET * edge)
-    if len(close.unpaired_slave) and len(close.unpaired_master):
-        return node_pairs(points, slave, master, tolerance=_REACH * edge, offset=_OFFSET * edge)
-    return close
+    found = None
+    for limits in ({}, {"tolerance": _REACH * edge, "offset": _OFFSET * edge}):
+        try:
+            found = node_pairs(points, slave, master, axisymmetric=axis, **limits)
+        except k_errors.EmptyContact:
+            if limits and zone.kinematics == "NOEU":
+                raise
+            continue
+        if not len(found.unpaired_slave) or not len(found.unpaired_master):
+            return found
+    return found if zone.kinematics == "NOEU" else None
 
 
 def nodal_property(ctx: Context, values: ChamZone | None, name: str, nodes: IntArray) -> FloatArray | None:
@@ -111,8 +161,15 @@ def nodal_property(ctx: Context, values: ChamZone | None, name: str, nodes: IntA
     return np.asarray(column[np.searchsorted(own, node_store(ctx).canonical(nodes))])
 
 
-def zone_friction(ctx: Context, zone: ContactZone, values: ChamZone | None, nodes: IntArray) -> Friction:
+def zone_gap(ctx: Context, zone: ContactZone, values: ChamZone | None, pairs: ContactPairs) -> FloatArray:
+    """Return the initial gaps of the pairs of a zone: those of MATE 'JEU', else of the geometry."""
+    nodal = nodal_property(ctx, values, "JEU", pairs.pairs[:, 0])
+    return pairs.gap if nodal is None else pairs.on_pairs(nodal)
+
+
+def zone_friction(ctx: Context, zone: ContactZone, values: ChamZone | None, pairs: ContactPairs) -> Friction:
     """Return the law of the pairs of a zone: stresses times the share of area of each node."""
+    nodes = pairs.pairs[:, 0]
     given: dict[str, FloatArray] = {}
     if values is not None:
         found = {name: nodal_property(ctx, values, name, nodes) for name in values.names}
@@ -121,10 +178,7 @@ def zone_friction(ctx: Context, zone: ContactZone, values: ChamZone | None, node
         given.pop("MU", None)
     if "SEUI" in given:
         given["COHE"] = given.pop("SEUI")
-    if given.keys() & {"COHE", "ADHE", "KT"}:
-        points = node_store(ctx).coords[:, : int(ctx.option("DIME"))]
-        area = nodal_areas(points, zone.slave.kernel_blocks, node_store(ctx).canonical(nodes))
-        given |= {name: given[name] * area for name in ("COHE", "ADHE", "KT") if name in given}
+    given |= {name: given[name] * pairs.area for name in ("COHE", "ADHE", "KT") if name in given}
     return friction(
         len(nodes),
         mu=given.get("MU", 0.0),
@@ -148,13 +202,17 @@ class SolvedContact:
     frames : (n, d, d) float64
         Rows: outward normal of body 1 (the slave), then the tangents.
     force : (n, d) float64, force
-        Nodal force on body 1 in these axes, negative normal in compression.
+        Nodal force on body 1 in these axes, negative normal in compression (at linear facets).
     relative : (n, d) float64, length
-        u1 - u2 in these axes.
+        Relative displacement at the slave nodes in these axes.
     gap : (n,) float64, length
-        Initial gap.
+        Initial gap at the slave nodes.
+    pair_force, pair_relative, pair_gap : as above
+        The same on the changed basis of quadratic facets, on which the law of contact holds.
     mu : (n,) float64
         Friction coefficient, 0 without friction.
+    motion : float, length
+        Largest displacement of the slave nodes.
     """
 
     zone: ContactZone
@@ -163,36 +221,51 @@ class SolvedContact:
     force: FloatArray
     relative: FloatArray
     gap: FloatArray
+    pair_force: FloatArray
+    pair_relative: FloatArray
+    pair_gap: FloatArray
     mu: FloatArray
+    motion: float
 
 
 def solved_contacts(
     ctx: Context, model: Modele, material: MChaml | None, u: ChPoint, reaction: ChPoint, at: str = "mc"
 ) -> list[SolvedContact]:
     """Gather the state of every contact zone of a model from a displacement and the contact forces (REAC)."""
-    found = []
+    found, kind, store = [], family(ctx), node_store(ctx)
     if not model.contacts:
         ctx.fail(26, "this model has no contact zone", at=at, hint="MODE G1 G2 'CONTACT' ... makes one")
     for zone in model.contacts:
-        dim = 3 if "UZ" in u.names else 2
         pairs = zone_pairs(ctx, zone, at)
-        frames, _, _ = local_frames(pairs.normals, np.ones((len(pairs.pairs), dim), bool))
+        frames, _, _ = local_frames(pairs.normals, np.ones(pairs.normals.shape, bool))
         values = material.zone_of(zone) if material is not None else None
-        slave, master = pairs.pairs.T
-        gap = nodal_property(ctx, values, "JEU", slave)
+        slave = pairs.pairs[:, 0]
+        gap = zone_gap(ctx, zone, values, pairs)
         mu = nodal_property(ctx, values, "MU", slave) if zone.law != "UNILATERAL" else None
-        relative = u.table(DISPLACEMENT[:dim], slave)
-        relative -= np.where(master[:, None] >= 0, u.table(DISPLACEMENT[:dim], master), 0.0)
-        force = reaction.table(FORCE[:dim], slave)
+        nodes, rows = _columns(pairs.matrix(store.count))
+        relative = rows @ u.table(DISPLACEMENTS[kind], nodes)
+        force = reaction.table(FORCES[kind], slave)
+        vectors = force, relative, pairs.forces_on_pairs(force), pairs.at_nodes(relative)
+        local_force, pair_relative, pair_force, at_nodes = (np.einsum("nij,nj->ni", frames, v) for v in vectors)
         found.append(
             SolvedContact(
                 zone,
                 pairs,
                 frames,
-                np.einsum("nij,nj->ni", frames, force),
-                np.einsum("nij,nj->ni", frames, relative),
-                pairs.gap if gap is None else gap,
+                local_force,
+                at_nodes,
+                pairs.at_nodes(gap),
+                pair_force,
+                pair_relative,
+                gap,
                 np.zeros(len(slave)) if mu is None else mu,
+                float(np.abs(u.table(DISPLACEMENTS[kind], slave)).max(initial=0.0)),
             )
         )
     return found
+
+
+def _columns(matrix: sp.csr_array) -> tuple[IntArray, sp.csr_array]:
+    """Keep the columns of a sparse matrix that are not empty."""
+    used = np.unique(matrix.indices).astype(np.int64)
+    return used, sp.csr_array(sp.csc_array(matrix)[:, used])

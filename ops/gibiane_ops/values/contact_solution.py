@@ -7,6 +7,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from gibiane.registry import Context
 from gibiane.values import Table
@@ -17,7 +18,7 @@ from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import solve_tied
-from gibiane_ops.kernels.contact.pairs import facets_of_body
+from gibiane_ops.kernels.contact.pairs import ContactPairs, facets_of_body
 from gibiane_ops.kernels.contact.report import OPEN, STICK, ContactState, check_state
 from gibiane_ops.kernels.contact.uniqueness import compare_starts
 from gibiane_ops.kernels.elements.table import shape
@@ -30,6 +31,9 @@ from gibiane_ops.values.rapport import TOLD, counted, departures, fill_report, s
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.solving import check_held, kept, tell_notes
 from gibiane_ops.values.system import System
+
+FAR = 0.5
+"""Slip over the size of the facets above which the pairs of the start are doubtful."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +79,15 @@ def solve_contact(
     F, imposed = load
     _check_normals(ctx, k, system)
     pairs = system.pairs(ctx, system.gaps(field))
-    if (pairs.gap < 0).any():
-        worst = int(np.argmin(pairs.gap))
+    deep = _overlapping(system, pairs)
+    if deep.any():
+        worst = int(np.argmin(np.where(deep, pairs.gap, np.inf)))
         where = " ".join(f"{x:g}" for x in pairs.points[worst])
         ctx.fail(
             "G403",
             "the solids penetrate each other at {count} nodes before any load, most at ({where}): {depth}",
             at="k",
-            count=int((pairs.gap < 0).sum()),
+            count=int(deep.sum()),
             where=where,
             depth=f"{-pairs.gap[worst]:.3g}",
             hint="move one solid, or give the gap: MATE MC 'JEU' 0.",
@@ -91,7 +96,7 @@ def solve_contact(
         reduction = reduce_conditions(system.C, imposed)
 
     def condensed() -> Condensation:
-        check_held(ctx, system, _held_rows(system, pairs.pairs))
+        check_held(ctx, system, _held_rows(system, pairs))
         try:
             return condense(system.K, pairs, reduction, stops=system.stops)
         except k_errors.SingularSystem as failure:
@@ -108,14 +113,18 @@ def solve_contact(
 
     with worded(ctx, at="k"):
         condensation: Condensation = kept(
-            ctx, "contact", k, (pairs.pairs.tobytes(), pairs.normals.tobytes()), condensed
+            ctx,
+            "contact",
+            k,
+            tuple(each.tobytes() for each in (pairs.pairs, pairs.normals, pairs.row, pairs.node, pairs.coefficient)),
+            condensed,
         )
         interface = condensation.interface(F, reduction.offset, system.stop_values(field), pairs.gap)
     tell_notes(ctx, condensation.factor)
     law = system.friction()
-    origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs.pairs, law, wishes.history)
-    start = None if wishes.start is None else _start(system, interface, pairs.pairs, law, wishes.start)
-    state = _run(ctx, system, interface, law, wishes, start, origin)
+    origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs, law, wishes.history)
+    start = None if wishes.start is None else _start(system, interface, pairs, law, wishes.start)
+    state = _run(ctx, system, interface, pairs, law, wishes, start, origin)
     if wishes.conditioning and wishes.report is not None:
         wishes.report.set(
             "CONDITION", _condition(system, condensation, reduction, interface, state, wishes.method, origin)
@@ -124,19 +133,45 @@ def solve_contact(
     n = len(pairs.pairs)
     vector = interface.to_global(state.r)[:n]
     on_stops = state.r[n:, 0]
-    forces = np.zeros_like(u).reshape(-1, system.dim)
-    np.add.at(forces, pairs.pairs[:, 0], vector)
-    solid = pairs.pairs[:, 1] >= 0
-    np.add.at(forces, pairs.pairs[solid, 1], -vector[solid])
+    forces = pairs.matrix(len(system.nodes)).T @ vector
     total = F + forces.ravel() + system.stops.T @ on_stops
     m = reduction.multipliers(reduction.reactions(system.K, u, total))
     return _with_contact_forces(system, system.field(u, m), state, vector, on_stops)
+
+
+def _overlapping(system: System, pairs: ContactPairs) -> NDArray[np.bool_]:
+    """Find the pairs that penetrate: by their surfaces, or by a gap that the user gave."""
+    whole = np.concatenate([np.zeros(0), *(part.pairs.gap for part in system.contacts)])
+    given = pairs.gap != whole
+    given[pairs.penetrating] = True
+    return np.asarray(given & (pairs.gap < 0))
+
+
+def _warn_far(ctx: Context, system: System, pairs: ContactPairs, state: ContactState) -> None:
+    """Say when slips are so large that nodes face other facets than those of the start."""
+    rigid = np.concatenate(
+        [np.zeros(0, bool), *(np.full(len(part.multipliers), part.zone.rigid) for part in system.contacts)]
+    )
+    slip = np.linalg.norm(state.w[: len(rigid), 1:], axis=1)
+    far = ~rigid & (slip > FAR * pairs.size)
+    if far.any():
+        worst = int(np.argmax(np.where(far, slip / pairs.size, 0.0)))
+        ctx.warn(
+            "G417",
+            "{count} contact nodes slip by more than half a facet, most by {slip} at ({where})",
+            at="k",
+            count=int(far.sum()),
+            slip=f"{slip[worst]:.3g}",
+            where=" ".join(f"{x:g}" for x in pairs.points[worst]),
+            hint="nodes keep the facets that they face at the start: the result holds for small slips",
+        )
 
 
 def _run(
     ctx: Context,
     system: System,
     interface: Interface,
+    pairs: ContactPairs,
     law: Friction,
     wishes: Wishes,
     start: ContactState | None,
@@ -175,6 +210,8 @@ def _run(
             reason=departures(state),
             hint="'RAPP' T gives the distance; 'NEWT' is exact, a penalty is nearer with a larger r",
         )
+    if converged and not method.approximate:
+        _warn_far(ctx, system, pairs, state)
     if wishes.compare and converged:
         # an approximate method may be far from every solution: the exact one is what is unique or not
         exact = method.solve_exact(interface, law, origin) if method.approximate else state
@@ -216,8 +253,9 @@ def _condition(
     r = 1.0 if method.r is None else method.r
     if method.matrix != "springs":
         return condensed_condition(interface, state, method.matrix, r, origin)
-    pairs = condensation.contact.pairs
-    C = sp.block_diag(list(interface.frames[: len(pairs)])) @ _held_rows(system, pairs)[: pairs.shape[0] * system.dim]
+    contact = condensation.contact
+    pairs = contact.pairs
+    C = sp.block_diag(list(interface.frames[: len(pairs)])) @ _held_rows(system, contact)[: pairs.shape[0] * system.dim]
     C = sp.csr_array(sp.vstack([C, *([system.stops] if system.stops.shape[0] else [])]))
     d = interface.dim
     kept = np.r_[np.arange(len(pairs) * d), len(pairs) * d + d * np.arange(system.stops.shape[0])]
@@ -235,11 +273,11 @@ def _condition(
     return spring_condition(interface, state, r, apply, lambda F: condensation.interface(F, nothing), n)
 
 
-def _relative(system: System, interface: Interface, pairs: IntArray, u: ChPoint) -> FloatArray:
+def _relative(system: System, interface: Interface, pairs: ContactPairs, u: ChPoint) -> FloatArray:
     """Return u1 - u2 of the pairs and the values of the stops, in local axes."""
     table = u.table(system.names, system.nodes)
-    moved = table[pairs[:, 0]] - np.where(pairs[:, 1:] >= 0, table[pairs[:, 1]], 0.0)
-    n = len(pairs)
+    moved = pairs.matrix(len(system.nodes)) @ table
+    n = len(moved)
     w = np.zeros(interface.active.shape)
     w[:n] = np.einsum("nij,nj->ni", interface.frames[:n], moved)
     w[n:, 0] = system.stops @ table.ravel()
@@ -264,7 +302,7 @@ def _forces(system: System, interface: Interface, u: ChPoint) -> FloatArray | No
 
 
 def _slip_origin(
-    ctx: Context, system: System, interface: Interface, pairs: IntArray, law: Friction, before: ChPoint
+    ctx: Context, system: System, interface: Interface, pairs: ContactPairs, law: Friction, before: ChPoint
 ) -> FloatArray:
     """Return the slips at the end of the load step before, without their elastic part."""
     w = _relative(system, interface, pairs, before)
@@ -281,7 +319,7 @@ def _slip_origin(
     return law.slip_of(w[:, 1:], r[:, 1:])
 
 
-def _start(system: System, interface: Interface, pairs: IntArray, law: Friction, u: ChPoint) -> ContactState:
+def _start(system: System, interface: Interface, pairs: ContactPairs, law: Friction, u: ChPoint) -> ContactState:
     """Make a first guess of a solution; forces that it does not hold are those of equilibrium."""
     w = _relative(system, interface, pairs, u)
     r = _forces(system, interface, u)
@@ -290,15 +328,9 @@ def _start(system: System, interface: Interface, pairs: IntArray, law: Friction,
     return check_state(interface, w, r, np.full(len(w), STICK), law, [], None)
 
 
-def _held_rows(system: System, pairs: IntArray) -> sp.csr_array:
+def _held_rows(system: System, pairs: ContactPairs) -> sp.csr_array:
     """Write the relative displacements of the pairs and the stops as rows."""
-    n, d = len(pairs), system.dim
-    row = np.repeat(np.arange(n * d), 2)
-    slave = pairs[:, :1] * d + np.arange(d)
-    master = np.maximum(pairs[:, 1:], 0) * d + np.arange(d)
-    column = np.stack([slave.ravel(), master.ravel()], axis=1).ravel()
-    value = np.stack([np.ones(n * d), np.repeat(np.where(pairs[:, 1] >= 0, -1.0, 0.0), d)], axis=1).ravel()
-    tied = sp.csr_array((value, (row, column)), shape=(n * d, system.K.shape[0]))
+    tied = sp.kron(pairs.matrix(len(system.nodes)), sp.eye_array(system.dim), format="csr")
     return sp.csr_array(sp.vstack([tied, system.stops], format="csr"))
 
 

@@ -123,20 +123,23 @@ class System:
         Fails with error 53 when a surface belongs to no solid of the matrix.
         """
         whole = joined([part.pairs for part in self.contacts]) if self.contacts else no_pairs(self.dim)
-        wanted = self.store.canonical(np.maximum(whole.pairs, 0))
+        every = np.concatenate([whole.pairs.ravel(), whole.node])
+        wanted = self.store.canonical(np.maximum(every, 0))
         ids = np.minimum(np.searchsorted(self.nodes, wanted), len(self.nodes) - 1)
-        lost = (self.nodes[ids] != wanted) & (whole.pairs >= 0)
-        if lost.any():
-            first = whole.points[np.flatnonzero(lost.any(axis=1))[0]]
+        lost = np.unique(wanted[(self.nodes[ids] != wanted) & (every >= 0)])
+        if len(lost):
+            first = self.store.coords[lost[0]][: self.dim]
             ctx.fail(
                 53,
                 "{count} contact nodes have no stiffness, the first at ({where})",
                 at="k",
-                count=int(lost.sum()),
+                count=len(lost),
                 where=" ".join(f"{x:g}" for x in first),
                 hint="join the stiffness of both solids; a surface that belongs to no solid is 'RIGIDE'",
             )
-        return replace(whole, pairs=np.where(whole.pairs < 0, -1, ids), gap=gap)
+        ids = np.where(every < 0, -1, ids)
+        n = whole.pairs.size
+        return replace(whole, pairs=ids[:n].reshape(-1, 2), node=ids[n:], gap=gap)
 
     def friction(self) -> Friction:
         """Return the law of every pair, and no friction for the stops."""

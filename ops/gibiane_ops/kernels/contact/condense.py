@@ -18,7 +18,7 @@ from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
 from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.interface import FREE_LIMIT, Interface
 from gibiane_ops.kernels.contact.pairs import ContactPairs
-from gibiane_ops.kernels.contact.ties import tie
+from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.errors import SingularSystem, TooLarge
 from gibiane_ops.kernels.solve import Factor, factorize
 
@@ -94,9 +94,7 @@ class Condensation:
         f = np.asarray(fields.Bw.T @ F0 - self._Kvw.T @ x0)
         # prescribed displacements of both nodes of a pair: part of the gap is already used up
         d = self.active.shape[1]
-        slave, master = self.contact.pairs.T
-        moved = U0.reshape(-1, d)
-        relative = moved[slave] - np.where(master[:, None] >= 0, moved[master], 0.0)
+        relative = self.contact.matrix(len(U0) // d) @ U0.reshape(-1, d)
         start = self.contact.gap if gap is None else gap
         start = (start - (relative * self.contact.normals).sum(axis=1)) / self._shortening
         stops = np.zeros(self.n_stops) if stop_values is None else stop_values
@@ -168,7 +166,7 @@ def condense(
     needed = interface_memory(len(contact.pairs) + n_stops, d)
     if needed > memory_limit:
         raise TooLarge(f"the dense interface of {len(contact.pairs) + n_stops} pairs", needed, memory_limit)
-    Bv, Bw, B0, free = tie(n_dofs, d, contact.pairs, reduction.fixed)
+    Bv, Bw, B0, free = tie_contact(n_dofs, d, contact, reduction.fixed)
     frames, active, shortening = local_frames(contact.normals, free)
     Bw = sp.csr_array(Bw @ _to_global(frames, active))
     if stops is not None and n_stops:
@@ -295,8 +293,9 @@ def _to_global(frames: FloatArray, active: BoolArray) -> sp.csr_array:
 
 def _rigid_candidates(contact: ContactPairs, frames: FloatArray, active: BoolArray) -> FloatArray:
     """Span the relative rigid motions of each zone that blocked components allow, by an orthonormal basis."""
+    points = contact.on_pairs(contact.points)
     modes = [
-        np.einsum("nij,njk->nik", frames, _rigid_modes(contact.points, contact.zone == zone)).reshape(active.size, -1)
+        np.einsum("nij,njk->nik", frames, _rigid_modes(points, contact.zone == zone)).reshape(active.size, -1)
         for zone in np.unique(contact.zone)
     ]
     candidates = _orthonormal(np.hstack(modes))

@@ -1,14 +1,16 @@
-"""Pairs of facing nodes of two contact surfaces, their normals and initial gaps."""
+"""Pairs of two contact surfaces, node to node or interpolated: relative displacements, normals and initial gaps."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.contact.facets import SHIFT, Surface, integrals, middles_of, surface_of
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, EmptyContact
 from gibiane_ops.kernels.geometry import normal_densities
@@ -20,15 +22,36 @@ ROUND_OFF = 1e-9
 FACING = -0.5
 """Cosine of the normals of a pair above which the surfaces do not face each other."""
 
+DEEP = 1e-6
+"""Overlaps below this fraction of the size of the facets are no penetration."""
+
+
+def _no_nodes() -> IntArray:
+    return np.zeros(0, np.int64)
+
+
+def _no_values() -> FloatArray:
+    return np.zeros(0)
+
+
+def _no_middles() -> IntArray:
+    return np.zeros((0, 3), np.int64)
+
 
 @dataclass(frozen=True, eq=False)
 class ContactPairs:
-    """Node pairs of one or several contact zones.
+    """Pairs of one or several contact zones: a slave node, and what lies in front of it on the master.
+
+    The relative displacement of pair p is ``w_p = u_s - sum_j c_pj u_j``: s is its slave node, c_pj is 1 for the master
+    node of a plain pair, an entry of (`row`, `node`, `coefficient`) otherwise, with its sign turned. For the middle m
+    of a side of a quadratic facet, between the corners a and b, ``w_m~ = (w_m - (w_a + w_b) / 5) / (3 / 5)`` in place
+    of w_m: forces on this basis have the sign of the pressure, those on plain corners have not.
 
     Attributes
     ----------
     pairs : (n, 2) int64
-        Slave node (body 1) and master node (body 2); -1 for a rigid obstacle, which has no unknowns.
+        Slave node (body 1) and master node (body 2); -1 where no single node faces the slave node: inside a facet, or
+        before a rigid obstacle, which has no unknowns.
     normals : (n, d) float64
         Unit outward normals of body 1.
     gap : (n,) float64, length
@@ -42,7 +65,14 @@ class ContactPairs:
     not_facing : (k,) int64
         Positions, in ``pairs``, of those whose surfaces do not face each other.
     penetrating : (k,) int64
-        Positions of those with a negative gap.
+        Positions of those whose surfaces overlap.
+    row, node : (k,) int64
+    coefficient : (k,) float64
+        Displacements of nodes that w counts beside those of `pairs` and of the slave's corners, minus the master's.
+    middles : (k, 3) int64
+        Positions of the pairs of middle nodes, and of those of their two corners.
+    area, size : (n,) float64, area, length
+        Share of the slave surface, and extent of its facets; empty when unknown.
     """
 
     pairs: IntArray
@@ -54,6 +84,120 @@ class ContactPairs:
     unpaired_master: IntArray
     not_facing: IntArray
     penetrating: IntArray
+    row: IntArray = field(default_factory=_no_nodes)
+    node: IntArray = field(default_factory=_no_nodes)
+    coefficient: FloatArray = field(default_factory=_no_values)
+    middles: IntArray = field(default_factory=_no_middles)
+    area: FloatArray = field(default_factory=_no_values)
+    size: FloatArray = field(default_factory=_no_values)
+
+    @staticmethod
+    def interpolated(
+        points: FloatArray,
+        slave: IntArray,
+        master: tuple[IntArray, IntArray, FloatArray],
+        middles: IntArray,
+        *,
+        normals: FloatArray,
+        gap: FloatArray,
+        area: FloatArray,
+        size: FloatArray,
+        unpaired_slave: IntArray,
+        unpaired_master: IntArray,
+        penetrating: IntArray,
+        not_facing: IntArray | None = None,
+    ) -> ContactPairs:
+        """Make pairs of one zone whose masters are points inside facets; entries of the same node are added up."""
+        n = len(slave)
+        entries = sp.coo_array((master[2], (master[0], master[1])), shape=(n, len(points)))
+        entries.sum_duplicates()
+        size_of = np.abs(entries.data)
+        used = size_of > 1e-14
+        row, node = entries.coords
+        return ContactPairs(
+            np.column_stack([slave, np.full(n, -1)]), normals, gap, points[slave].reshape(n, -1),
+            np.zeros(n, np.int64), unpaired_slave, unpaired_master,
+            _no_nodes() if not_facing is None else not_facing, penetrating,
+            row[used].astype(np.int64), node[used].astype(np.int64), entries.data[used], middles, area, size,
+        )  # fmt: skip
+
+    @property
+    def plain(self) -> NDArray[np.bool_]:
+        """Pairs of two nodes, or of a node and an obstacle, without any other displacement: (n,) bool."""
+        plain = np.ones(len(self.pairs), dtype=bool)
+        plain[self.row] = False
+        plain[self.middles[:, 0]] = False
+        return plain
+
+    def matrix(self, n_nodes: int) -> sp.csr_array:
+        """Give the relative displacements from those of the nodes, one component: ``w = matrix @ u``.
+
+        Parameters
+        ----------
+        n_nodes : int
+
+        Returns
+        -------
+        (n, n_nodes) csr_array
+        """
+        n = len(self.pairs)
+        solid = np.flatnonzero(self.pairs[:, 1] >= 0)
+        row = np.concatenate([np.arange(n), solid, self.row])
+        node = np.concatenate([self.pairs[:, 0], self.pairs[solid, 1], self.node])
+        value = np.concatenate([np.ones(n), -np.ones(len(solid)), self.coefficient])
+        matrix = sp.csr_array((value, (row, node)), shape=(n, n_nodes))
+        if len(self.middles):
+            # entries of interpolated middles are of the changed basis already, their slave nodes are not
+            inner = sp.csr_array((self.coefficient, (self.row, self.node)), shape=(n, n_nodes))
+            return sp.csr_array(self._basis() @ (matrix - inner) + inner)
+        return matrix
+
+    def _basis(self) -> sp.csr_array:
+        """Give the values of pairs from those at their nodes."""
+        n = len(self.pairs)
+        m, a, b = self.middles.T
+        diagonal = np.ones(n)
+        diagonal[m] = 1 / (1 - 2 * SHIFT)
+        row = np.concatenate([np.arange(n), m, m])
+        column = np.concatenate([np.arange(n), a, b])
+        side = np.full(len(m), -SHIFT / (1 - 2 * SHIFT))
+        return sp.csr_array((np.concatenate([diagonal, side, side]), (row, column)), shape=(n, n))
+
+    def on_changed_basis(self) -> ContactPairs:
+        """Take entries and gaps that were written for plain nodes to the changed basis of quadratic facets."""
+        if not len(self.middles):
+            return self
+        n = len(self.pairs)
+        columns, place = np.unique(self.node, return_inverse=True)
+        entries = sp.csr_array((self.coefficient, (self.row, place)), shape=(n, len(columns)))
+        changed = sp.coo_array(self._basis() @ entries)
+        row, column = changed.coords
+        return replace(
+            self,
+            gap=self.on_pairs(self.gap),
+            row=row.astype(np.int64),
+            node=columns[column],
+            coefficient=changed.data,
+        )
+
+    def on_pairs(self, nodal: FloatArray) -> FloatArray:
+        """Turn values at the slave nodes, such as displacements and gaps, (n, ...), into those of the pairs."""
+        return np.asarray(self._basis() @ nodal) if len(self.middles) else nodal
+
+    def at_nodes(self, values: FloatArray) -> FloatArray:
+        """Turn displacements and gaps of the pairs, (n, ...), into those at their slave nodes."""
+        found = values.copy()
+        m, a, b = self.middles.T
+        found[m] = (1 - 2 * SHIFT) * values[m] + SHIFT * (values[a] + values[b])
+        return found
+
+    def forces_on_pairs(self, nodal: FloatArray) -> FloatArray:
+        """Turn forces on the slave nodes, (n, ...), into those of the pairs."""
+        found = nodal.copy()
+        m, a, b = self.middles.T
+        found[m] = (1 - 2 * SHIFT) * nodal[m]
+        np.add.at(found, np.concatenate([a, b]), SHIFT * np.concatenate([nodal[m], nodal[m]]))
+        return found
 
 
 def node_pairs(
@@ -63,6 +207,7 @@ def node_pairs(
     *,
     tolerance: float | None = None,
     offset: float | None = None,
+    axisymmetric: bool = False,
 ) -> ContactPairs:
     """Pair each slave node with the master node at the same place.
 
@@ -76,6 +221,8 @@ def node_pairs(
         initial gap need one above the gap and below half of the node spacing.
     offset : float, optional
         Largest distance of two paired nodes along the surface, no limit when left out.
+    axisymmetric : bool
+        Areas go once round the axis.
 
     Returns
     -------
@@ -113,6 +260,8 @@ def node_pairs(
         apart = points[master_nodes[nearest[kept]]] - points[slave_nodes[kept]]
         across = np.einsum("ni,ni->n", apart, slave_normals[kept])[:, None] * slave_normals[kept]
         kept = kept[np.linalg.norm(apart - across, axis=1) <= offset]
+    surface = surface_of(points, slave, split=False)
+    kept = _with_corners(surface, kept)
     if not len(kept):
         raise EmptyContact(f"the nearest nodes are {distance.min():g} apart, the tolerance is {reach:g}")
     partner = nearest[kept]
@@ -131,7 +280,63 @@ def node_pairs(
         np.delete(master_nodes, partner),
         np.flatnonzero(cosine > FACING),
         np.flatnonzero(gap < 0),
+        middles=_middles(surface, kept),
+        area=integrals(points, surface, axisymmetric)[kept],
+        size=surface.size[kept],
     )
+
+
+def _with_corners(surface: Surface, kept: IntArray) -> IntArray:
+    """Leave out the middle nodes of sides whose corners are not kept: their pair holds these too."""
+    has = np.zeros(len(surface.nodes), dtype=bool)
+    has[kept] = True
+    middles = middles_of(surface.facets)
+    has[middles[~has[middles[:, 1:]].all(axis=1), 0]] = False
+    return kept[has[kept]]
+
+
+def _middles(surface: Surface, kept: IntArray) -> IntArray:
+    """Give the positions, among the kept nodes, of middle nodes and their corners."""
+    position = np.full(len(surface.nodes), -1, np.int64)
+    position[kept] = np.arange(len(kept))
+    found = position[middles_of(surface.facets)]
+    return found[found[:, 0] >= 0]
+
+
+def with_surface(pairs: ContactPairs, points: FloatArray, slave: Sequence[Block], axisymmetric: bool) -> ContactPairs:
+    """Add areas, sizes and the corners of quadratic facets to pairs that have none.
+
+    Parameters
+    ----------
+    pairs : ContactPairs
+        Of one zone.
+    points : (n_points, d) float64, length
+    slave : sequence of (shape name, (m, n_nodes) int64)
+    axisymmetric : bool
+
+    Returns
+    -------
+    ContactPairs
+        Without the middles of sides whose corners have no pair; gaps are those of the pairs.
+    """
+    surface = surface_of(points, slave, split=False)
+    place = np.searchsorted(surface.nodes, pairs.pairs[:, 0])
+    kept = np.flatnonzero(np.isin(place, _with_corners(surface, place)))
+    place = place[kept]
+    old = np.full(len(pairs.pairs), -1, np.int64)
+    old[kept] = np.arange(len(kept))
+    found = replace(
+        pairs,
+        pairs=pairs.pairs[kept], normals=pairs.normals[kept], gap=pairs.gap[kept], points=pairs.points[kept],
+        zone=pairs.zone[kept],
+        not_facing=old[pairs.not_facing][old[pairs.not_facing] >= 0],
+        penetrating=old[pairs.penetrating][old[pairs.penetrating] >= 0],
+        unpaired_slave=np.setdiff1d(surface.nodes, surface.nodes[place]),
+        middles=_middles(surface, place),
+        area=integrals(points, surface, axisymmetric)[place],
+        size=surface.size[place],
+    )  # fmt: skip
+    return replace(found, gap=found.on_pairs(found.gap))
 
 
 def no_pairs(dim: int) -> ContactPairs:
@@ -173,7 +378,17 @@ def joined(zones: Sequence[ContactPairs]) -> ContactPairs:
         np.concatenate([zone.unpaired_master for zone in zones]),
         np.concatenate([zone.not_facing + start for zone, start in zip(zones, starts, strict=False)]),
         np.concatenate([zone.penetrating + start for zone, start in zip(zones, starts, strict=False)]),
+        np.concatenate([zone.row + start for zone, start in zip(zones, starts, strict=False)]),
+        np.concatenate([zone.node for zone in zones]),
+        np.concatenate([zone.coefficient for zone in zones]),
+        np.concatenate([zone.middles + start for zone, start in zip(zones, starts, strict=False)]),
+        np.concatenate([_filled(zone.area, len(zone.pairs)) for zone in zones]),
+        np.concatenate([_filled(zone.size, len(zone.pairs)) for zone in zones]),
     )
+
+
+def _filled(values: FloatArray, n: int) -> FloatArray:
+    return values if len(values) == n else np.full(n, np.nan)
 
 
 def nodal_normals(points: FloatArray, facets: Sequence[Block]) -> tuple[IntArray, FloatArray]:
