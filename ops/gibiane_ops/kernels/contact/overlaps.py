@@ -259,9 +259,9 @@ def _reference(corners: FloatArray, ref: FloatArray, x: FloatArray) -> FloatArra
         return np.asarray(ref[:, 0] + t * (ref[:, 1] - ref[:, 0]))
     if c == 3:
         A = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=2)
-        t = np.linalg.solve(A, (x - corners[:, 0])[..., None])
+        ratio = np.linalg.solve(A, (x - corners[:, 0])[..., None])
         R = np.stack([ref[:, 1] - ref[:, 0], ref[:, 2] - ref[:, 0]], axis=2)
-        return np.asarray(ref[:, 0] + (R @ t)[..., 0])
+        return np.asarray(ref[:, 0] + (R @ ratio)[..., 0])
     quadrangle = shape("QUA4")
     xi: FloatArray = np.zeros(x.shape)
     for _ in range(20):

@@ -82,10 +82,10 @@ def _interpolated(
     lead = _leading(Bv, Bw, B0, slave)
     held = lead.reshape(-1, d) < 0
     # a normal that is held needs the master to move
-    on_normal = (held & (np.abs(normals) > 1e-6)).any(axis=1)
-    master_held = np.asarray(np.diff(_cleaned(rows @ B0).indptr).reshape(-1, d)) > 1
-    empty = np.asarray(np.diff(G.indptr)).reshape(-1, d) == 0
-    wanted = np.asarray(~(held & (empty | (master_held & ~on_normal[:, None])))).ravel()
+    on_normal = (held & (np.abs(normals) > 1e-6)).any(axis=1, keepdims=True)
+    master_held: BoolArray = np.reshape(np.diff(_cleaned(rows @ B0).indptr), (-1, d)) > 1
+    empty: BoolArray = np.reshape(np.diff(G.indptr), (-1, d)) == 0
+    wanted = np.asarray(~(held & (empty | (master_held & ~on_normal)))).ravel()
     pivot, wanted = _pivots(G, lead, wanted)
     chosen = np.flatnonzero(wanted)
     free.reshape(-1)[place[chosen]] = True
