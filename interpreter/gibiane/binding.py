@@ -15,7 +15,7 @@ from gibiane.diagnostics import Diagnostic, GibianeError, Label, Text, make, nea
 from gibiane.forms import Arg, Form, Key
 from gibiane.nodes import Literal, Name, Node
 from gibiane.source import SourceText, Span
-from gibiane.values import ANNULE, ANY, ENTIER, FLOTTANT, MOT, PROCEDUR, Procedure, Table, type_of
+from gibiane.values import ANNULE, ANY, ENTIER, FLOTTANT, LOGIQUE, MOT, PROCEDUR, Procedure, Table, type_of
 
 
 class Mark:
@@ -201,7 +201,7 @@ class Operands:
     def unknown_keyword(self, words: Sequence[str]) -> GibianeError:
         """Return the error 7 for the first unread word, with the accepted ones."""
         i = self.first_word()
-        accepted = ", ".join(f"'{w}'" for w in words)
+        accepted = _listed(words, self.values[i] if i >= 0 and isinstance(self.values[i], str) else "")
         if i < 0:
             return GibianeError(make(7, "a keyword is missing; accepted: {accepted}", accepted=accepted))
         value = self.values[i]
@@ -225,6 +225,20 @@ class Operands:
         """Put results at the front, in order, where the next operator finds them first."""
         self.values[:0] = results
         self.nodes[:0] = [node] * len(results)
+
+
+# Accepted words that a message shows; of more only those that resemble what was written.
+SHOWN = 12
+
+
+def _listed(words: Sequence[str], written: str) -> str:
+    """Return accepted words between quotes; of many the likeliest, and how many there are."""
+    if len(words) <= SHOWN:
+        return ", ".join(f"'{w}'" for w in words)
+    from difflib import SequenceMatcher
+
+    likely = sorted(words, key=lambda w: -SequenceMatcher(None, written[:4], w[:4]).ratio())[: SHOWN // 2]
+    return ", ".join(f"'{w}'" for w in words if w in likely) + f" ... ({len(words)})"
 
 
 class Mismatch:
@@ -348,6 +362,9 @@ def explain(name: str, misses: list[Mismatch], q: Operands, *, symbolic: bool) -
     """Word the failure of every form of the operator `name`: an unknown keyword, a missing operand, or wrong types."""
     i = q.first_word()
     first = q.values[i][:4] if i >= 0 and isinstance(q.values[i], str) else None
+    # Forms that cannot take an object that is there are not what was meant.
+    objects = {type_of(v) for v in q.values} - {MOT, ENTIER, FLOTTANT, LOGIQUE, PROCEDUR}
+    misses = [m for m in misses if _takes(m.form, objects)] or misses
     # A form whose keyword stands first is the one that was meant.
     named = [m for m in misses if any(word[:4] == first for key in m.form.keys for word in key.words)]
     best = max(named or misses, key=lambda m: m.matched)
@@ -377,6 +394,12 @@ def explain(name: str, misses: list[Mismatch], q: Operands, *, symbolic: bool) -
     failure.diagnostic.forms = forms
     failure.diagnostic.more = f"INFO {name} ;"
     return failure
+
+
+def _takes(form: Form, types: set[str]) -> bool:
+    """Say whether a form has operands of all these types."""
+    wanted = {t for arg in (*form.args, *(a for key in form.keys for a in key.args)) for t in arg.types}
+    return form.stream or ANY in wanted or types <= wanted
 
 
 def _is_misspelt_name(q: Operands, i: int, best: Mismatch, keys: Sequence[str]) -> bool:

@@ -282,6 +282,8 @@ class Evaluator:
                     diag.operator = op.name
                 if diag.span is None:
                     diag.span = q.span(node)
+                if diag.hint is None and diag.code in ("7", "37", "533") and not diag.trace:
+                    diag.hint = _read_otherwise(node, op)
                 raise
             if op.terminal:
                 break
@@ -295,10 +297,12 @@ class Evaluator:
         first, node = q.take((ENTIER, FLOTTANT))
         if first is ABSENT:
             return
-        second, _ = q.take((ENTIER, FLOTTANT))
+        second, other = q.take((ENTIER, FLOTTANT))
         if second is ABSENT:
             q.push_front([first], node)
             return
+        if self.session.options["WARN"] and node is not None and other is not None:
+            faults.warn_comma(self, q.span(node), q.span(other))
         coordinates = [first, second]
         if dim == 3:
             third, _ = q.take((ENTIER, FLOTTANT))
@@ -367,3 +371,13 @@ class Evaluator:
         q = Operands(self.session, span.source, arguments, [node] * len(arguments))
         procedures.call(self, procedure, q, node)
         return q.values
+
+
+def _read_otherwise(node: Node, op: Operator) -> Text | None:
+    """Say that a word was read as the operator that shares its first four letters, when it is no short form of it."""
+    if not isinstance(node, Name) or len(node.word) <= 4 or op.whole or op.name.startswith(node.word.upper()):
+        return None
+    fields = {"word": node.word.upper(), "name": op.name}
+    if fields["word"] == "PRINT":
+        return Text("{word} is read as {name}, by its first four letters; MESS writes on the screen", fields)
+    return Text("{word} is read as {name}, by its first four letters", fields)

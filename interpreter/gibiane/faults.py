@@ -298,6 +298,24 @@ def warn_traps(ev: Runner, op: Operator, q: Operands, at: int) -> None:
             )
 
 
+def warn_comma(ev: Runner, first: Span, second: Span) -> None:
+    """Warn of two integers with nothing but a comma between them: a point, where a real may have been meant."""
+    if first.end + 1 == second.start and first.text.lstrip("+-").isdigit() and second.text.isdigit():
+        between = first.to(second)
+        if between.text[first.end - first.start] == ",":
+            ev.session.emit(
+                make(
+                    "G301",
+                    "{text} is the point of coordinates {x} and {y}: a comma is a blank",
+                    text=between.text,
+                    x=first.text,
+                    y=second.text,
+                    span=between,
+                    hint="a real is written with a dot: {x}.{y}",
+                )
+            )
+
+
 def local_objects(ev: Runner) -> Text:
     """Return the note that shows what the procedure of the current frame holds (OPTI DEBU 1)."""
     frame = ev.frame

@@ -175,4 +175,6 @@ def _scaled(ctx: Context, k: Rigidite, x: float) -> Rigidite:
     if k.conditions or k.contacts:
         ctx.fail(26, "conditions cannot be multiplied by a number", at="k", hint="multiply the matrix before ET")
     parts = [MatrixPart(p.nodes, p.names, p.duals, sp.csr_array(p.matrix * x), p.mesh) for p in k.matrices]
+    for part, source in zip(parts, k.matrices, strict=True):
+        part.symmetric = source.symmetric
     return Rigidite(parts)

@@ -8,16 +8,18 @@ import numpy as np
 
 from gibiane.forms import Arg
 from gibiane.registry import Context, extend, operator
-from gibiane.values import MCHAML, MMODEL, RIGIDITE
+from gibiane.values import MAILLAGE, MCHAML, MMODEL, RIGIDITE
 from gibiane_ops.kernels import assembly
 from gibiane_ops.values import mechanics
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.contact import NEEDS, warn_unpaired, zone_friction, zone_gap, zone_pairs
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
+from gibiane_ops.values.material import on_zone
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
-from gibiane_ops.values.rigidite import ContactPart, MatrixPart, Rigidite
+from gibiane_ops.values.parts import model_part
+from gibiane_ops.values.rigidite import ConditionPart, ContactPart, MatrixPart, Rigidite
 
 RIGI = operator(
     "RIGIDITE",
@@ -54,7 +56,9 @@ def _solid(ctx: Context, model: Modele, material: MChaml) -> Rigidite:
     nodes = mesh.nodes
     blocks = [(np.searchsorted(nodes, zone.cells), mechanics.stiffness(ctx, zone, material)) for zone in zones]
     matrix = assembly.assemble(len(nodes), dim, blocks)
-    return Rigidite([MatrixPart(nodes, DISPLACEMENTS[family], FORCES[family], matrix, mesh)])
+    part = MatrixPart(nodes, DISPLACEMENTS[family], FORCES[family], matrix, mesh)
+    part.origin = model, material
+    return Rigidite([part])
 
 
 def _contact(ctx: Context, model: Modele, material: MChaml | None) -> Any:
@@ -76,6 +80,39 @@ def _contact(ctx: Context, model: Modele, material: MChaml | None) -> Any:
     nodes = np.concatenate([n for n, _ in gaps])
     values_of_gaps = np.concatenate([g for _, g in gaps])
     return Rigidite(parts), ChPoint(store, {"FLX": (nodes, values_of_gaps)}, "DISCRET")
+
+
+@extend("REDUIRE").form(Arg("k", RIGIDITE, "matrix"), Arg("mesh", MAILLAGE, "elements"), gives=[RIGIDITE])
+def _redu(ctx: Context, k: Rigidite, mesh: Maillage) -> Rigidite:
+    """Keep the elements of a mesh, and the conditions whose nodes all belong to it."""
+    parts: list[Any] = []
+    solid = Maillage(mesh.store, [b for b in mesh.blocks if b.shape != "POI1"])
+    for part in k.matrices:
+        if part.origin is None:
+            ctx.fail(251, "only matrices of RIGI can be reduced to some elements", at="k")
+        model = model_part(ctx, part.origin[0], solid)
+        zones = [on_zone(ctx, part.origin[1], zone, "k") for zone in model.zones]
+        material = MChaml(zones, part.origin[1].subtype, part.origin[1].support)
+        parts += _solid(ctx, model, material).parts
+    nodes = mesh.nodes
+    for condition in k.conditions:
+        outside = np.unique(condition.row[~np.isin(condition.node, nodes)])
+        rows = np.setdiff1d(np.arange(len(condition.multipliers)), outside)
+        if len(rows):
+            kept = np.isin(condition.row, rows)
+            parts.append(
+                ConditionPart(
+                    np.searchsorted(rows, condition.row[kept]),
+                    condition.node[kept],
+                    condition.name[kept],
+                    condition.coefficients[kept],
+                    condition.multipliers[rows],
+                    condition.sense,
+                    condition.label,
+                    condition.line,
+                )
+            )
+    return Rigidite(parts)
 
 
 UNION = extend("ET")

@@ -42,7 +42,6 @@ MECHANICS = {
     "the fields must have the same components on the same nodes": "les champs doivent avoir les mêmes composantes aux mêmes noeuds",
     "the field has no value": "le champ n'a pas de valeur",
     "no component in common ({left}; {right})": "aucune composante commune ({left} ; {right})",
-    "some {shape} of the mesh are not elements of one zone of the model": "des {shape} du maillage ne sont pas des éléments d'une zone du modèle",
     "the field has {count} components ({known}): name the one to integrate": "le champ a {count} composantes ({known}) : nommer celle à intégrer",
     "no value of the field satisfies the condition: the mesh is empty": "aucune valeur du champ ne vérifie la condition : le maillage est vide",
     "no element field of sub-type {subtype} among the operands": "aucun champ par éléments de sous-type {subtype} parmi les opérandes",

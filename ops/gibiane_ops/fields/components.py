@@ -9,7 +9,20 @@ import numpy as np
 from gibiane.diagnostics import nearest
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
-from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTMOTS, LOGIQUE, MAILLAGE, MCHAML, MMODEL, MOT, POINT
+from gibiane.values import (
+    CHPOINT,
+    ENTIER,
+    FLOTTANT,
+    LISTMOTS,
+    LOGIQUE,
+    MAILLAGE,
+    MCHAML,
+    MMODEL,
+    MOT,
+    POINT,
+    TABLE,
+    Table,
+)
 from gibiane_ops.values.algebra import SCAL, Field, Incompatible, chosen
 from gibiane_ops.values.champs import DIFFUS, DISCRET, INDETERMINE, ChPoint, MChaml
 from gibiane_ops.values.listes import ListMots, ListReel
@@ -47,6 +60,18 @@ def pick(ctx: Context, field: Field, names: list[str], new: list[str], *, lenien
             hint="did you mean {close}?" if close else None,
             **failure.fields,
         )
+
+
+def rename(ctx: Context, old: ListMots, new: ListMots, field: Field, nature: str | None) -> Field:
+    """Return a field some of whose components (operand `old`) have other names (operand `new`)."""
+    if len(old.words) != len(new.words):
+        ctx.fail(212, "{old} components and {new} new names", at="new", old=len(old.words), new=len(new.words))
+    pick(ctx, field, list(old.words), list(new.words), lenient=False, at="old")
+    table = dict(zip(old.words, new.words, strict=True))
+    names = [table.get(n, n) for n in field.names]
+    if len(set(names)) < len(names):
+        ctx.fail(21, "two components would have one name", at="new")
+    return with_nature(ctx, chosen(field, field.names, names), nature)
 
 
 EXCO = operator(
@@ -125,14 +150,7 @@ def _nomc(ctx: Context, name: str, field: Field, nature: str | None) -> Field:
     gives=["CHPOINT|MCHAML"],
 )
 def _nomc_several(ctx: Context, old: ListMots, new: ListMots, field: Field, nature: str | None) -> Field:
-    if len(old.words) != len(new.words):
-        ctx.fail(212, "{old} components and {new} new names", at="new", old=len(old.words), new=len(new.words))
-    pick(ctx, field, list(old.words), list(new.words), lenient=False, at="old")
-    table = dict(zip(old.words, new.words, strict=True))
-    names = [table.get(n, n) for n in field.names]
-    if len(set(names)) < len(names):
-        ctx.fail(21, "two components would have one name", at="new")
-    return with_nature(ctx, chosen(field, field.names, names), nature)
+    return rename(ctx, old, new, field, nature)
 
 
 EXTR = extend("EXTRAIRE")
@@ -246,6 +264,15 @@ def _names_of_model(ctx: Context, model: Modele, what: str) -> ListMots:
     if not model.zones:
         ctx.fail(21, "the model has no solid, only contact", at="model")
     return ListMots(_TABLES[what][model.zones[0].family])
+
+
+@EXTR.form(Arg("model", MMODEL, "model"), Key("ZONE", "its zones, one by one", required=True), gives=[TABLE])
+def _zones_of_model(ctx: Context, model: Modele, zone: bool) -> Table:
+    table = Table()
+    every = [Modele([each]) for each in model.zones] + [Modele([], [each]) for each in model.contacts]
+    for number, each in enumerate(every, 1):
+        table.set(number, each)
+    return table
 
 
 @extend("EXIS").form(

@@ -8,17 +8,20 @@ import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
-from gibiane.values import CHPOINT, MAILLAGE, MCHAML, MMODEL, MOT, POINT
+from gibiane.values import CHPOINT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT
+from gibiane_ops.fields.components import rename, with_nature
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
-from gibiane_ops.values.algebra import SCAL, SCALAIRE, restricted
+from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, chosen
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
-from gibiane_ops.values.maillage import Block, Maillage, Point
+from gibiane_ops.values.listes import ListMots
+from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, NodeStore, node_store
+from gibiane_ops.values.parts import model_part
 
 CHAN = extend("CHANGER")
 TYPE = Arg("subtype", MOT, "sub-type of the result", optional=True)
@@ -137,13 +140,46 @@ def _retitled(ctx: Context, titre: bool, field: ChPoint, text: str) -> ChPoint:
     return ChPoint(field.store, field.parts, field.nature, text.strip())
 
 
+@CHAN.form(
+    Key("COMP", "other names of components", required=True),
+    Arg("name", MOT, "new name"),
+    Arg("field", (CHPOINT, MCHAML), "field"),
+    Key("NATURE", "nature", Arg("nature", MOT)),
+    gives=["CHPOINT|MCHAML"],
+)
+def _renamed(ctx: Context, comp: bool, name: str, field: Field, nature: str | None) -> Field:
+    if len(field.names) != 1:
+        ctx.fail(
+            21,
+            "the field has {count} components ({known}): which is to be renamed?",
+            at="field",
+            count=len(field.names),
+            known=" ".join(field.names),
+            hint="CHAN 'COMP' (MOTS 'old') (MOTS 'new') FIELD renames some of them",
+        )
+    return with_nature(ctx, chosen(field, field.names, [name.strip()]), nature)
+
+
+@CHAN.form(
+    Key("COMP", "other names of components", required=True),
+    Arg("old", LISTMOTS, "components"),
+    Arg("new", LISTMOTS, "new names"),
+    Arg("field", (CHPOINT, MCHAML), "field"),
+    Key("NATURE", "nature", Arg("nature", MOT)),
+    gives=["CHPOINT|MCHAML"],
+)
+def _renamed_several(ctx: Context, comp: bool, old: ListMots, new: ListMots, field: Field, nature: str | None) -> Field:
+    return rename(ctx, old, new, field, nature)
+
+
 REDU = operator(
     "REDUIRE",
     topic="fields",
     summary="a field or a model on a part of its support",
     notice="`REDU CH G`: a nodal field on the nodes of a mesh, of a point or of another field; an element field on the "
     "elements of a mesh or of a model; a model on the elements of a mesh. The elements of the mesh must be among "
-    "those of the field or model.",
+    "those of the field or model. `REDU MODL 'CONTACT'`: the contact zones of a model; `REDU RIG G`: the stiffness of "
+    "some elements, and the conditions whose nodes all belong to the mesh.",
     example="OPTI DIME 2 ELEM SEG2 ; L = DROIT 2 (0. 0.) (1. 0.) ; CH = COOR 1 L ;\n"
     "MESS (MAXI (REDU CH (L POIN 'INIT'))) ;",
     see=["EXCO", "ELEM"],
@@ -171,31 +207,9 @@ def _limited(field: ChPoint, nodes: Any) -> ChPoint:
     return ChPoint(field.store, parts, field.nature, field.title)
 
 
-def _part(ctx: Context, model: Modele, mesh: Maillage) -> Modele:
-    """Return a model on the elements of a mesh; every one must belong to the model."""
-    marks = [MChaml([ChamZone(z, [SCAL], np.zeros((len(z.cells), 1, 1)))], SCALAIRE, "GRAVITE") for z in model.zones]
-    zones = []
-    for block in mesh.blocks:
-        part = Maillage(mesh.store, [Block(block.shape, block.cells, block.colours)])
-        home = next(
-            (
-                z
-                for z, mark in zip(model.zones, marks, strict=True)
-                if restricted(mark, ModelZone(part, z.formulation, z.law, z.mode)) is not None
-            ),
-            None,
-        )
-        if home is None:
-            ctx.fail(
-                21, "some {shape} of the mesh are not elements of one zone of the model", at="mesh", shape=block.shape
-            )
-        zones.append(ModelZone(part, home.formulation, home.law, home.mode))
-    return Modele(zones)
-
-
 @REDU.form(Arg("model", MMODEL, "model"), Arg("mesh", MAILLAGE, "elements"), gives=[MMODEL])
 def _model(ctx: Context, model: Modele, mesh: Maillage) -> Modele:
-    return _part(ctx, model, mesh)
+    return model_part(ctx, model, mesh)
 
 
 @REDU.form(Arg("field", MCHAML, "element field"), Arg("model", MMODEL, "model"), gives=[MCHAML])
@@ -208,8 +222,15 @@ def _on_model(ctx: Context, field: MChaml, model: Modele) -> MChaml:
 @REDU.form(Arg("field", MCHAML, "element field"), Arg("mesh", MAILLAGE, "elements"), gives=[MCHAML])
 def _on_elements(ctx: Context, field: MChaml, mesh: Maillage) -> MChaml:
     whole = Modele([z.zone for z in field.zones if isinstance(z.zone, ModelZone)])
-    zones = [on_zone(ctx, field, z, "field") for z in _part(ctx, whole, mesh).zones]
+    zones = [on_zone(ctx, field, z, "field") for z in model_part(ctx, whole, mesh).zones]
     return MChaml(zones, field.subtype, field.support, field.title)
+
+
+@REDU.form(Arg("model", MMODEL, "model"), Key("CONTACT", "its contact zones", required=True), gives=[MMODEL])
+def _contacts(ctx: Context, model: Modele, contact: bool) -> Modele:
+    if not model.contacts:
+        ctx.fail(21, "this model has no contact zone", at="model", hint="MODE G1 G2 'CONTACT' ... makes one")
+    return Modele([], model.contacts)
 
 
 INTG = operator(

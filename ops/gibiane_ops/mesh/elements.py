@@ -150,7 +150,8 @@ def _elem(ctx: Context, q: Operands) -> Any:
         q.values[:], q.nodes[:] = saved
         if g is None:
             return Refused
-        raise q.unknown_keyword(["APPUYE", "CONTENANT", "COMPRIS", "TYPE", "COUL", *ELEMENTS, *COLOURS])
+        colours = [COLOURS[i] for i in np.unique(np.concatenate([b.colours for b in g.blocks]))] if g.blocks else []
+        raise q.unknown_keyword(["APPUYE", "CONTENANT", "COMPRIS", "TYPE", "COUL", *g.shapes, *colours[:6]])
     chosen = g
     if types:
         chosen = Maillage(g.store, [b for b in g.blocks if b.shape in types])

@@ -42,7 +42,8 @@ COOR = operator(
     summary="coordinates of points, meshes and fields",
     notice="`X = COOR 1 P` is the first coordinate of a point; `X Y Z = COOR P` gives all of them. Of a mesh "
     "or a CHPOINT, the result is a CHPOINT of component SCAL on its nodes. The number after the last "
-    "coordinate is the density. `COOR L 'CURV'` is the distance along a line from its first point.",
+    "coordinate is the density. Of a MMODEL or MCHAML: a MCHAML, at the nodes of its elements or where the field "
+    "stands. `COOR L 'CURV'` is the distance along a line from its first point.",
     example="OPTI DIME 2 ELEM SEG2 ; P = 3. 4. ; X Y = COOR P ; MESS X ' ' (COOR 2 P) ;",
     see=["DIST", "NORM"],
 )

@@ -14,13 +14,13 @@ from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
 from gibiane_ops.kernels.packages import DIRECT, is_installed
 from gibiane_ops.kernels.rigid import rigid_modes
 from gibiane_ops.kernels.solve import Factor, factorize
+from gibiane_ops.kernels.unsymmetric import solve_unsymmetric
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.nodes import FloatArray, IntArray
 from gibiane_ops.values.rigidite import Rigidite
-from gibiane_ops.values.solving import check_held, kept, tell_notes
+from gibiane_ops.values.solving import ELASTIC, check_held, kept, tell_notes
 from gibiane_ops.values.system import System
 
-ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
 ENERGY_LIMIT = 1e-6
 """Share of the energy that may be missing in ``u.K.u = u.(F + r)`` before a warning is due."""
 ROUND_OFF = 1e-13
@@ -110,6 +110,8 @@ def solve_linear(
     """Solve for several second members with one factorisation, kept for the next call with the same matrix."""
     F = np.column_stack([force for force, _ in loads])
     reduction = reduced(ctx, system, np.column_stack([values for _, values in loads]))
+    if not system.symmetric:
+        return _unsymmetric(ctx, system, reduction, F)
     wish = _wish(ctx)
 
     def choice(solutions: int) -> Choice:
@@ -136,6 +138,17 @@ def solve_linear(
     _check_energy(ctx, system, u, F, r)
     m = reduction.multipliers(r)
     return [system.field(u[:, i], m[:, i]) for i in range(count)]
+
+
+def _unsymmetric(ctx: Context, system: System, reduction: Reduction, F: FloatArray) -> list[ChPoint]:
+    """Solve with a matrix without symmetry (MANU 'RIGI' 'QUEL')."""
+    try:
+        v = solve_unsymmetric(reduction.matrix(system.K), reduction.load(system.K, F))
+    except k_errors.SingularSystem as failure:
+        singular(ctx, system, failure, reduction.free)
+    u = reduction.expand(v)
+    m = reduction.multipliers(reduction.reactions(system.K, u, F))
+    return [system.field(u[:, i], m[:, i]) for i in range(F.shape[1])]
 
 
 def _wish(ctx: Context) -> str:

@@ -11,16 +11,22 @@ import scipy.sparse as sp
 from gibiane.values import RIGIDITE, Value
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.maillage import Maillage
-from gibiane_ops.values.modele import ContactZone
+from gibiane_ops.values.modele import ContactZone, Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray
 
 
 class MatrixPart:
-    """A symmetric matrix on the unknowns `names` of `nodes` (sorted): row `d i + c` is name c of node i.
+    """A matrix on the unknowns `names` of `nodes` (sorted): row `d i + c` is name c of node i.
 
     `mesh` holds the elements that it came from: contact looks there on which side of a surface its solid lies.
+    `symmetric` is false for some matrices made by hand; `origin` is the model and the material of a stiffness, from
+    which that of fewer elements can be made.
     """
+
+    symmetric: bool = True
+    origin: tuple[Modele, MChaml] | None = None
 
     def __init__(
         self,

@@ -15,6 +15,10 @@ from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.system import System
 
 
+ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
+"""Unknowns of systems that know rigid motions."""
+
+
 def kept(ctx: Context, kind: str, k: Rigidite, extra: Hashable, make: Callable[[], Any]) -> Any:
     """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
 
@@ -39,7 +43,7 @@ def tell_notes(ctx: Context, solver: Factor) -> None:
 def check_held(ctx: Context, system: System, contact_rows: sp.csr_array | None = None) -> None:
     """Fail with G404 when a solid can move as a rigid body, naming the motion."""
     C = system.C if contact_rows is None else sp.vstack([system.C, contact_rows], format="csr")
-    if system.dim != len(system.names) or system.names[0] not in ("UX",):
+    if system.names not in ELASTIC:
         return
     motions = free_motions(system.K, system.points, C)
     if motions:

@@ -38,6 +38,8 @@ class System:
     stop_multipliers : (k,) int64
     stop_signs : (k,) float64
         1 for MAXI, -1 for MINI: the rows, and the values of the load, are multiplied by it.
+    symmetric : bool
+        Whether K is.
     """
 
     store: NodeStore
@@ -52,6 +54,7 @@ class System:
     stops: sp.csr_array
     stop_multipliers: IntArray
     stop_signs: FloatArray
+    symmetric: bool = True
 
     @property
     def dim(self) -> int:
@@ -224,6 +227,14 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
         shape=(start, size),
     )
     sign = np.concatenate([np.zeros(0), *signs])
+    symmetric = all(part.symmetric for part in rigidity.matrices)
+    if not symmetric and (rigidity.contacts or sign.any()):
+        ctx.fail(
+            251,
+            "contact and unilateral conditions want a symmetric matrix",
+            at="k",
+            hint="'NOUN' makes equalities of unilateral conditions",
+        )
     carriers = np.concatenate([empty_ids, *multipliers])
     equal, stop = np.flatnonzero(sign == 0), np.flatnonzero(sign)
     return System(
@@ -239,6 +250,7 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
         sp.csr_array(sp.diags_array(sign[stop]) @ C[stop]) if len(stop) else C[stop],
         carriers[stop],
         sign[stop],
+        symmetric,
     )
 
 

@@ -16,6 +16,7 @@ CASES = [
     ("MESS = 3 ;", "the name MESS now hides the operator MESSAGE"),
     ("WHATEVER ;", "WHATEVER does nothing"),
     ("X = PROG1 2. ;", "the word PROG1 runs the operator PROGRESSION"),
+    ("OPTI DIME 2 ; X = 3,5 ;", "3,5 is the point of coordinates 3 and 5: a comma is a blank"),
     ("OPTI DIME 2 ; Q = 0. 6./2. ;", "/ reads the two leftmost numbers, not those beside it"),
 ]
 
@@ -41,6 +42,7 @@ def test_a_script_is_not_disturbed(text: str, capsys: pytest.CaptureFixture[str]
         "L = PROGRESS 1. ;",
         "MESSAGE 'a' ;",
         "X*ENTIER = 2 ;",
+        "OPTI DIME 2 ; P = 3, 5 ; Q = 0.,5. ;",
     ],
 )
 def test_what_is_usual_gives_no_warning(text: str, capsys: pytest.CaptureFixture[str]) -> None:
