@@ -14,7 +14,6 @@ from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.system import System
 
-
 ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
 """Unknowns of systems that know rigid motions."""
 
