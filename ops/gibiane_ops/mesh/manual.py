@@ -20,7 +20,7 @@ MANU = operator(
     "after layer: MANU SEG3 P1 M P2. `MANU 'CHPO' G 'UX' 1. ...` and `MANU 'CHML' MODL ...` make fields. `MANU "
     "'RIGI' G LMOTS LREEL`: a matrix that is the same on all elements of G; LMOTS names the unknowns at a node "
     "(several: one per node of an element), LREEL holds its rows, whole or up to the diagonal, in one list or several; "
-    "'ANTI' antisymmetric, 'QUEL' without symmetry, 'DUAL' names the forces. `MANU 'RIGI' CHPO 'DIAG'`: a diagonal matrix.",
+    "'ANTI' antisymmetric, 'QUEL' without symmetry, 'DUAL' names the forces. A CHPOINT and 'DIAG': diagonal.",
     example="OPTI DIME 2 ; P1 = 0. 0. ; P2 = 1. 0. ; P3 = 1. 1. ; T = MANU TRI3 P1 P2 P3 ; MESS (MESU T) ;",
     see=["QUELCONQUE", "CHANGER"],
 )
