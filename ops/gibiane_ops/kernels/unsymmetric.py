@@ -42,7 +42,7 @@ def solve_unsymmetric(A: sp.csr_array, b: FloatArray) -> FloatArray:
     except RuntimeError as error:
         raise SingularSystem("a pivot vanishes") from error
     x = np.asarray(factor.solve(b), np.float64)
-    x = x + factor.solve(b - A @ x)
+    x = np.asarray(x + factor.solve(b - A @ x), np.float64)
     size = np.maximum(np.abs(b).max(axis=0), np.finfo(float).tiny)
     if not np.isfinite(x).all() or (np.abs(A @ x - b).max(axis=0) > RESIDUAL_LIMIT * size).any():
         raise SingularSystem("the residual is not small")
