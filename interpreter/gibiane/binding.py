@@ -362,11 +362,12 @@ def explain(name: str, misses: list[Mismatch], q: Operands, *, symbolic: bool) -
     """Word the failure of every form of the operator `name`: an unknown keyword, a missing operand, or wrong types."""
     i = q.first_word()
     first = q.values[i][:4] if i >= 0 and isinstance(q.values[i], str) else None
-    # Forms that cannot take an object that is there are not what was meant.
-    objects = {type_of(v) for v in q.values} - {MOT, ENTIER, FLOTTANT, LOGIQUE, PROCEDUR}
-    misses = [m for m in misses if _takes(m.form, objects)] or misses
     # A form whose keyword stands first is the one that was meant.
     named = [m for m in misses if any(word[:4] == first for key in m.form.keys for word in key.words)]
+    if not named:
+        # Forms that cannot take an object that is there are not what was meant.
+        objects = {type_of(v) for v in q.values} - {MOT, ENTIER, FLOTTANT, LOGIQUE, PROCEDUR}
+        misses = [m for m in misses if _takes(m.form, objects)] or misses
     best = max(named or misses, key=lambda m: m.matched)
     said = {value[:4] for value in q.values if isinstance(value, str)}
     meant = [m for m in misses if any(word[:4] in said for key in m.form.keys for word in key.words)]
