@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
+from itertools import islice
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
-from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess
@@ -14,6 +13,7 @@ from gibiane_ops.kernels.contact.outcome import PATIENCE, finished, physical_sta
 from gibiane_ops.kernels.contact.penalty import check_stiffness
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState
+from gibiane_ops.kernels.contact.splitting import splitting_steps
 
 
 def solve_bipotential(
@@ -70,33 +70,19 @@ def solve_bipotential(
     One dense factorisation in all, a back substitution and a vectorised projection an iteration; tens to thousands of
     iterations.
     """
-    from scipy.linalg import cho_factor, cho_solve
-
     law = Friction.of(interface.n_pairs, mu)
     law.need_coulomb("the bipotential method")
     check_stiffness(rho)
     problem = Problem.of(interface, law, 1.0, slip_origin)
-    coefficient = np.minimum(law.mu, 1e6)
-    factor = cho_factor(problem.S + rho * np.eye(len(problem.f)))
-    z, r = first_guess(problem, start)
-    r = _cone(problem, r, coefficient)
-    z = z - problem.origin
-    S0 = problem.S @ problem.origin.ravel()
     history: list[float] = []
     converged = False
-    w = z + problem.origin
+    w, r = first_guess(problem, start)
 
     def state() -> ContactState:
         status = problem.project(problem.augmented(w, r))[1]
         return physical_state(interface, law, problem, w, r, status, history, slip_origin)
 
-    for number in range(max_iter):
-        v = cho_solve(factor, problem.f - S0 + (r + rho * z).ravel()).reshape(r.shape)
-        shifted = v.copy()
-        shifted[:, 0] -= coefficient * norms(v[:, 1:])
-        new = _cone(problem, r - rho * shifted, coefficient)
-        z = v + (new - r) / rho
-        w, r = v + problem.origin, new
+    for number, (w, r) in enumerate(islice(splitting_steps(problem, (w, r), rho), max_iter)):
         history.append(problem.merit(w, r))
         if history[-1] <= tolerance:
             converged = True
@@ -104,8 +90,3 @@ def solve_bipotential(
         if number == PATIENCE:
             raise_if_unbalanced(interface, state())
     return finished(interface, state(), converged)
-
-
-def _cone(problem: Problem, r: FloatArray, mu: FloatArray) -> FloatArray:
-    """Project on the cone; a pair whose normal is held elsewhere carries nothing."""
-    return np.where(problem.holds[:, None], orthogonal_projection(r, mu), 0.0)

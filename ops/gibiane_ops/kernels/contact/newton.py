@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.outcome import physical_state
 from gibiane_ops.kernels.contact.problem import BoolArray, Problem
 from gibiane_ops.kernels.contact.report import STICK, ContactState, check_state
+from gibiane_ops.kernels.contact.splitting import splitting_steps
 from gibiane_ops.kernels.errors import NotConverged
 
 ROUND_OFF = 1e-14
@@ -27,6 +29,9 @@ _FEW = 20
 
 _STALL = 8
 """Full steps without a better residual after which another attempt is made."""
+
+_SPLITTINGS = 6000
+"""Alternations of the last attempt."""
 
 _MEMORY = 4
 """A damped step must improve on the worst of the last few residuals, not on the last one."""
@@ -78,7 +83,8 @@ def solve_coulomb(
     With ``a = r - gamma (w - gap n)``: open when ``a_n >= 0`` (r = 0), stick when ``abs(a_t) <= mu abs(a_n)`` (w_t = 0)
     and slip otherwise (``r_t = mu abs(r_n) a_t / abs(a_t)``). Coulomb solutions are unique for small coefficients only:
     for large ones this is one solution. When full steps fail, the load is first checked against the cone on the free
-    motions; then come a start without friction, a softer gamma, damped steps, and growing coefficients. With adhesion
+    motions; then come a start without friction, a softer gamma, damped steps, growing coefficients, and the slow but
+    steady splitting of the bipotential, from which Newton's steps finish; all are counted. With adhesion
     the pairs that touch start bonded, and those whose tension exceeds it come off, the worst first, each set for good.
 
     Source
@@ -240,6 +246,8 @@ def _solve(
     soft = replace(problem, gamma=min(problem.gamma, SOFT_GAMMA))
     if not best.converged and law.rubs.any():
         best = best.better(_grow_friction(soft, first, tolerance, max_iter, history))
+    if not best.converged and problem.law.is_coulomb and law.rubs.any():
+        best = best.better(_from_splitting(problem, first, tolerance, history))
     if not best.converged:
         raise_if_runaway(interface, state(last), state(best))
         raise NotConverged(history, state(best))
@@ -300,6 +308,20 @@ def _grow_friction(
         found = newton_steps(milder, guess, tolerance, max_iter, history, damped=True)[0]
         guess = found.w, found.r
     return newton_steps(problem, guess, tolerance, max_iter, history, damped=True)[0]
+
+
+def _from_splitting(
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, history: list[float]
+) -> Iterate:
+    """Alternate equilibrium and cone, and try to finish with Newton's steps now and then."""
+    best = Iterate.of(problem, *first, tolerance)
+    for number, (w, r) in enumerate(islice(splitting_steps(problem, first, 1.0), _SPLITTINGS), 1):
+        history.append(problem.merit(w, r))
+        if number % 200 == 0:
+            best = best.better(newton_steps(problem, (w, r), tolerance, _FEW, history)[0])
+            if best.converged:
+                break
+    return best
 
 
 def _energy(problem: Problem, w: FloatArray, r: FloatArray) -> float:
