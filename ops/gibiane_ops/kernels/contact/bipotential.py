@@ -76,13 +76,13 @@ def solve_bipotential(
     problem = Problem.of(interface, law, 1.0, slip_origin)
     history: list[float] = []
     converged = False
-    w, r = first_guess(problem, start)
+    w, r = first = first_guess(problem, start)
 
     def state() -> ContactState:
         status = problem.project(problem.augmented(w, r))[1]
         return physical_state(interface, law, problem, w, r, status, history, slip_origin)
 
-    for number, (w, r) in enumerate(islice(splitting_steps(problem, (w, r), rho), max_iter)):
+    for number, (w, r) in enumerate(islice(splitting_steps(problem, first, rho), max_iter)):
         history.append(problem.merit(w, r))
         if history[-1] <= tolerance:
             converged = True
