@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import CHPOINT, ENTIER, FLOTTANT, RIGIDITE, TABLE, Table
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTCHPO, RIGIDITE, TABLE, Table
 from gibiane_ops.values.champs import DISCRET, ChPoint
 from gibiane_ops.values.conditions import family
 from gibiane_ops.values.contact_solution import Wishes, solve_contact
@@ -17,6 +18,7 @@ from gibiane_ops.values.methods import PLAIN, STATUSES, WITH_R, Method
 from gibiane_ops.values.modele import FORCES
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.suites import ListChpo
 from gibiane_ops.values.system import build
 
 RESO = operator(
@@ -24,10 +26,12 @@ RESO = operator(
     topic="resolution",
     summary="solve a linear system with its conditions, and contact with friction",
     notice="`U = RESO K F`: K joins stiffness, conditions (BLOQ, SYMT, RELA) and contact conditions (RIGI of a contact "
-    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members and further calls with the "
-    "same matrices share one factorisation. A single solution of a large solid comes from conjugate gradients with "
-    "algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into the "
-    "memory; OPTI 'RESO' 'DIRE' or 'ITER' chooses instead, OPTI 'ECHO' 1 tells. Conditions with MINI or MAXI act like "
+    "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members, a LISTCHPO of them, and "
+    "further calls with the same matrices share one factorisation. A few solutions of a large solid come from conjugate gradients "
+    "with algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into "
+    "the memory; OPTI 'RESO' 'DIRE' or 'ITER' chooses instead, OPTI 'ECHO' 1 tells. A matrix with negative eigenvalues "
+    "is solved too, by factorisation or MINRES. "
+    "Conditions with MINI or MAXI act like "
     "contact; 'NOUN' makes equalities of them, and ties contact surfaces. 'NOID' ignores the part of the load that "
     "the matrix does not know. LX holds the multipliers of the conditions, on nodes of their own. Contact methods; "
     "the interface is condensed once for all of them, and r is a multiple of its stiffness, so that no result depends "
@@ -115,13 +119,33 @@ def _reso(
     noun: bool,
     noid: bool,
 ) -> Any:
-    system = build(ctx, k, bilateral=noun)
-    loads = [system.load(ctx, field, lenient=noid) for field in f]
+    chosen = _method(ctx, method, with_r, statuses, tole, itma)
+    wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq, ncon)
+    return tuple(_solutions(ctx, k, f, prec, noid, wishes))
+
+
+@RESO.form(
+    Arg("k", RIGIDITE, "stiffness and conditions"),
+    Arg("fields", LISTCHPO, "second members"),
+    Arg("prec", FLOTTANT, "relative residual of iterations", optional=True),
+    Key("NOUN", "unilateral conditions are equalities"),
+    Key("NOID", "ignore what the matrix does not know"),
+    gives=[LISTCHPO],
+)
+def _reso_list(ctx: Context, k: Rigidite, fields: ListChpo, prec: float | None, noun: bool, noid: bool) -> ListChpo:
+    wishes = Wishes(_method(ctx, None, None, None, None, None), None, None, None, False, noun, False, False)
+    return ListChpo(_solutions(ctx, k, fields.objects, prec, noid, wishes) if len(fields) else [])
+
+
+def _solutions(
+    ctx: Context, k: Rigidite, fields: Sequence[ChPoint], prec: float | None, lenient: bool, wishes: Wishes
+) -> list[ChPoint]:
+    """Solve for every second member."""
+    system = build(ctx, k, bilateral=wishes.bonded)
+    loads = [system.load(ctx, field, lenient=lenient) for field in fields]
     if system.contacts or system.stops.shape[0]:
-        chosen = _method(ctx, method, with_r, statuses, tole, itma)
-        wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq, ncon)
-        return tuple(solve_contact(ctx, k, system, *pair, wishes) for pair in zip(f, loads, strict=True))
-    return tuple(solve_linear(ctx, k, system, loads, prec))
+        return [solve_contact(ctx, k, system, *pair, wishes) for pair in zip(fields, loads, strict=True)]
+    return solve_linear(ctx, k, system, loads, prec)
 
 
 def _method(

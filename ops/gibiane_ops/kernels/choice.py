@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gibiane_ops.kernels.packages import DIRECT, is_installed
+from gibiane_ops.kernels.memory import available_memory
+from gibiane_ops.kernels.packages import DIRECT, SUPERLU_LIMIT, is_installed
 
-SMALL = 60_000
+SMALL = 15_000
 """Unknowns up to which a direct factorisation is at least as fast as multigrid, on a solid in space."""
 
-MANY_SOLUTIONS = 4
-"""Number of solutions with one matrix from which a factorisation is cheaper than iterations."""
+EACH = 6_000
+"""A factorisation is cheaper than iterations for more solutions than there are times this many unknowns."""
+
+FEW_COLUMNS = 24
+"""Solutions up to which a factorisation in single precision, each of them corrected, is the faster one."""
 
 MEMORY_SHARE = 0.6
 """Share of the free memory that a factorisation may take."""
@@ -23,7 +27,7 @@ class Choice:
     Attributes
     ----------
     method : str
-        ``auto`` (direct), ``amg`` or ``cg``, for ``solve.factorize``.
+        ``auto`` or ``single`` (direct), ``amg``, ``cg`` or ``minres``, for ``solve.factorize``.
     memory : float
         Predicted memory, bytes.
     reserve : bool
@@ -34,21 +38,10 @@ class Choice:
     memory: float
     reserve: bool
 
-
-def available_memory() -> float:
-    """Return the memory that a process may still take, bytes; infinity where the system does not say."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as lines:
-            free = next(int(line.split()[1]) * 1024.0 for line in lines if line.startswith("MemAvailable"))
-    except (OSError, StopIteration):
-        free = float("inf")
-    try:
-        import resource
-
-        limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    except (ImportError, OSError):
-        return free
-    return min(free, float(limit)) if limit > 0 else free
+    @property
+    def direct(self) -> bool:
+        """Whether the matrix is factorised, without the unknowns that conditions eliminate."""
+        return self.method in ("auto", "single")
 
 
 def direct_memory(n: int, dim: int) -> float:
@@ -70,14 +63,22 @@ def direct_memory(n: int, dim: int) -> float:
 
 
 def iterative_memory(entries: int) -> float:
-    """Predict the memory of a multigrid hierarchy, bytes, from the entries of the matrix."""
-    return 24.0 * entries
+    """Predict the memory of conjugate gradients with multigrid, bytes, from the entries of the matrix."""
+    return 40.0 * entries
 
 
 def choose(
-    n: int, entries: int, dim: int, solutions: int, *, wish: str = "", elastic: bool = True, memory: float | None = None
+    n: int,
+    entries: int,
+    dim: int,
+    solutions: int,
+    *,
+    wish: str = "",
+    definite: bool = True,
+    elastic: bool = True,
+    memory: float | None = None,
 ) -> Choice:
-    """Choose a solver for a symmetric positive definite system.
+    """Choose a solver for a symmetric system.
 
     Parameters
     ----------
@@ -89,34 +90,39 @@ def choose(
         Solutions wanted so far with this matrix.
     wish : str
         ``DIRE`` or ``ITER`` when the user prefers one.
+    definite : bool
+        Whether the matrix may be positive definite; its diagonal tells when it cannot.
     elastic : bool
-        Whether the unknowns are displacements, whose rigid-body modes make multigrid fast.
+        Whether the unknowns are displacements (or one scalar), whose rigid-body modes make multigrid fast.
     memory : float, optional
         Free memory, bytes; that of the machine by default.
 
     Returns
     -------
     Choice
-        Direct for small systems, in the plane, for several solutions; multigrid for one solution of a large solid
-        and whenever a factorisation would not fit.
+        Direct for small systems, in the plane, for many solutions; multigrid for few solutions of a large solid
+        and whenever a factorisation would not fit; MINRES for an indefinite matrix that cannot be factorised.
 
     Notes
     -----
-    With 106 000 unknowns in space multigrid takes half the time of a factorisation, but each further solution takes
-    as long as a quarter of one.
+    With 106 000 unknowns in space (2 cores) multigrid takes 0.7 s and 0.5 s for each solution, a factorisation 10 s
+    and 0.15 s, in single precision 5 s and 0.3 s.
     """
     room = MEMORY_SHARE * (available_memory() if memory is None else memory)
     need = direct_memory(n, dim)
     fits = need <= room
-    iterative = "amg" if is_installed("amg") and elastic else "cg"
     fast = any(is_installed(name) for name in DIRECT if name != "superlu")
+    iterative = ("amg" if elastic else "cg") if definite else "minres"
     if wish == "ITER":
         direct = False
     elif wish == "DIRE" or n <= SMALL:
         direct = True
+    elif not fast and n > SUPERLU_LIMIT and iterative == "amg":
+        direct = False
     else:
-        single = dim == 3 and elastic and solutions < MANY_SOLUTIONS
-        direct = fits and not (iterative == "amg" and (single or not fast))
+        few = dim == 3 and iterative == "amg" and solutions * EACH < n
+        direct = fits and not few
     if direct:
-        return Choice("auto", need, True)
-    return Choice(iterative, iterative_memory(entries), fits)
+        halved = n > SMALL and solutions <= FEW_COLUMNS and definite and is_installed("rslab")
+        return Choice("single", need / 2, True) if halved else Choice("auto", need, True)
+    return Choice(iterative, iterative_memory(entries), fits and (fast or n <= SUPERLU_LIMIT))

@@ -1,4 +1,4 @@
-"""The packages that factorise or iterate, one function each: from a sparse matrix to a function that solves.
+"""The packages that factorise, one function each: from a sparse matrix to a function that solves.
 
 They check nothing: `solve.Factor` does, for all of them.
 """
@@ -6,7 +6,7 @@ They check nothing: `solve.Factor` does, for all of them.
 from __future__ import annotations
 
 import importlib.util
-import warnings
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -14,14 +14,16 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.errors import TooLarge
+from gibiane_ops.kernels.memory import available_memory
 
 Solve = Callable[[FloatArray], FloatArray]
 
 DIRECT = ("rslab", "pardiso", "superlu")
-MODULES = {"rslab": "rslab", "pardiso": "pypardiso", "superlu": "scipy", "amg": "pyamg", "cg": "scipy"}
-# Nodes of the coarsest level of the multigrid hierarchy, which is solved by a dense pseudo-inverse.
-COARSEST = 40
-MOST_ITERATIONS = {"amg": 300, "cg": 20_000}
+MODULES = {"rslab": "rslab", "pardiso": "pypardiso", "superlu": "scipy"}
+
+SUPERLU_LIMIT = 30_000
+"""Number of unknowns above which SuperLU is some fifty times slower than a supernodal package."""
 
 
 def is_installed(name: str) -> bool:
@@ -29,119 +31,82 @@ def is_installed(name: str) -> bool:
     return importlib.util.find_spec(MODULES[name]) is not None
 
 
-def rslab(A: sp.csr_array) -> Solve:
-    """Factorise by rslab's supernodal LDL^T."""
+class Factored:
+    """The solve of a package, and how many negative eigenvalues the factorisation met (None: not known)."""
+
+    def __init__(self, run: Solve, negative: int | None) -> None:
+        self._run = run
+        self.negative = negative
+
+    def __call__(self, b: FloatArray) -> FloatArray:
+        """Solve for one or several right-hand sides, (n,) or (n, k)."""
+        return np.asarray(self._run(b), np.float64).reshape(b.shape)
+
+
+def rslab(A: sp.sparray, *, single: bool = False) -> Factored:
+    """Factorise by rslab's supernodal LDL^T, of a definite or indefinite matrix, in double or single precision.
+
+    Raises
+    ------
+    TooLarge
+        When the analysis of the pattern predicts more memory than there is.
+    """
     import rslab
 
-    factor = rslab.ldlt(A.tocsc())
+    lower = sp.tril(A, format="csc")
+    options = {"factor_dtype": "float32"} if single else {}
+    analysis = rslab.analyze(lower, path="ldlt", **options)
+    needed = float(analysis.memory_plan("float32" if single else "float64")["peak_bytes"])
+    limit = available_memory()
+    if needed > limit:
+        raise TooLarge(f"the factorisation of {A.shape[0]} unknowns", needed, limit)
+    factor = analysis.factor(lower, **options)
 
     def solve(b: FloatArray) -> FloatArray:
         return np.asarray(factor.solve(b) if b.ndim == 1 else factor.solve_many(np.ascontiguousarray(b)))
 
-    return solve
+    return Factored(solve, int(factor.inertia[1]))
 
 
-def pardiso(A: sp.csr_array) -> Solve:
-    """Factorise by MKL's PARDISO: symmetric positive definite, upper triangle."""
-    from pypardiso import PyPardisoSolver
+def pardiso(A: sp.sparray) -> Factored:
+    """Factorise the upper triangle by MKL's PARDISO, as positive definite or, where that fails, as indefinite."""
     from pypardiso.pardiso_wrapper import PyPardisoError
 
-    solver = PyPardisoSolver(mtype=2)
     upper = sp.triu(A, format="csr")
     try:
+        return _pardiso(upper, 2)
+    except PyPardisoError:
+        try:
+            return _pardiso(upper, -2)
+        except PyPardisoError as error:
+            raise RuntimeError(str(error)) from error
+
+
+def _pardiso(upper: sp.csr_array, kind: int) -> Factored:
+    from pypardiso import PyPardisoSolver
+
+    solver: Any = PyPardisoSolver(mtype=kind)
+    try:
         solver.factorize(upper)
-    except PyPardisoError as error:
-        raise RuntimeError(str(error)) from error
-    return lambda b: np.asarray(solver.solve(upper, np.asfortranarray(b))).reshape(b.shape)
+    except BaseException:
+        solver.free_memory()
+        raise
+    found = Factored(lambda b: solver.solve(upper, np.asfortranarray(b)), int(solver.get_iparm(23)) if kind < 0 else 0)
+    # MKL keeps the factor until it is told otherwise
+    weakref.finalize(found, solver.free_memory)
+    return found
 
 
-def superlu(A: sp.csr_array) -> Solve:
-    """Factorise by SciPy's SuperLU, rows and columns ordered alike."""
+def superlu(A: sp.sparray) -> Factored:
+    """Factorise by SciPy's SuperLU: rows and columns ordered alike, by columns with pivoting where a diagonal is not
+    positive.
+    """
     from scipy.sparse.linalg import splu
 
-    options = {"SymmetricMode": True}
-    factor = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
-    return lambda b: np.asarray(factor.solve(b))
-
-
-class Iteration:
-    """Conjugate gradients with a preconditioner, column by column.
-
-    Attributes
-    ----------
-    iterations : int
-        Of the last solve, the largest over its columns.
-    """
-
-    def __init__(self, run: Callable[[FloatArray, list[float]], FloatArray]) -> None:
-        self._run = run
-        self.iterations = 0
-
-    def __call__(self, b: FloatArray) -> FloatArray:
-        """Solve for one or several right-hand sides."""
-        self.iterations = 0
-        found = []
-        for column in b.reshape(len(b), -1).T:
-            residuals: list[float] = []
-            # a singular matrix breaks the iteration down: the residual check of the caller finds that out
-            with warnings.catch_warnings(record=True), np.errstate(all="ignore"):
-                found.append(self._run(np.ascontiguousarray(column), residuals))
-            self.iterations = max(self.iterations, len(residuals) - 1)
-        return np.stack(found, axis=1).reshape(b.shape)
-
-
-def amg(A: sp.csr_array, near_null: FloatArray | None, block: int, tolerance: float) -> Solve:
-    """Make a smoothed-aggregation hierarchy for conjugate gradients (pyamg).
-
-    Parameters
-    ----------
-    A : (n, n) csr_array
-    near_null : (n, k) float64 or None
-        Modes of zero energy of the matrix without its supports: the rigid-body modes.
-    block : int
-        Unknowns per node; nodes are aggregated whole.
-    tolerance : float
-        Relative residual, Euclidean norm.
-    """
-    import pyamg
-
-    whole = A.tobsr(blocksize=(block, block)) if block > 1 else A
-    smoother = ("block_gauss_seidel" if block > 1 else "gauss_seidel", {"sweep": "symmetric"})
-    hierarchy: Any = pyamg.smoothed_aggregation_solver(
-        whole, B=near_null, symmetry="symmetric", strength=("symmetric", {"theta": 0.0}),
-        presmoother=smoother, postsmoother=smoother, max_coarse=COARSEST,
-    )  # fmt: skip
-
-    def run(b: FloatArray, residuals: list[float]) -> FloatArray:
-        most = MOST_ITERATIONS["amg"]
-        return np.asarray(hierarchy.solve(b, tol=tolerance, accel="cg", maxiter=most, residuals=residuals))
-
-    return Iteration(run)
-
-
-def cg(A: sp.csr_array, block: int, tolerance: float) -> Solve:
-    """Prepare conjugate gradients with the inverses of the diagonal blocks as preconditioner (block Jacobi)."""
-    from scipy.sparse.linalg import LinearOperator, cg
-
-    n = A.shape[0]
-    diagonal = np.zeros((n // block, block, block))
-    entries = A.tocoo()
-    own = entries.row // block == entries.col // block
-    row, column = entries.row[own], entries.col[own]
-    diagonal[row // block, row % block, column % block] = entries.data[own]
-    inverse = np.linalg.inv(diagonal)
-
-    def precondition(r: FloatArray) -> FloatArray:
-        return np.asarray(np.einsum("nij,nj->ni", inverse, r.reshape(-1, block)).ravel())
-
-    M = LinearOperator((n, n), matvec=precondition)
-
-    def run(b: FloatArray, residuals: list[float]) -> FloatArray:
-        residuals.append(float(np.linalg.norm(b)))
-
-        def count(x: FloatArray) -> None:
-            residuals.append(0.0)
-
-        return np.asarray(cg(A, b, rtol=tolerance, atol=0.0, maxiter=MOST_ITERATIONS["cg"], M=M, callback=count)[0])
-
-    return Iteration(run)
+    matrix = A.tocsc()
+    if (matrix.diagonal() > 0).all():
+        options = {"SymmetricMode": True}
+        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    else:
+        factor = splu(matrix)
+    return Factored(factor.solve, None)

@@ -1,7 +1,7 @@
-"""Factorise and solve symmetric positive definite sparse systems, with whatever package is installed.
+"""Solve symmetric sparse systems, with whatever package is installed, and check every answer.
 
-Every solve is checked, so that a package may be young, missing or wrong: a bad residual is refined once, then the next
-package takes over and a note says so. A singular matrix is recognised by its own null vector, never by a package.
+Packages may be young, missing or wrong: a bad residual is refined once, then the next package takes over and a note says
+so. A singular matrix is recognised by its own null vector, never by a package.
 """
 
 from __future__ import annotations
@@ -9,31 +9,32 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import packages
+from gibiane_ops.kernels import iterations, packages
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.errors import BadValue, MissingPackage, SingularSystem
-from gibiane_ops.kernels.packages import DIRECT, MODULES, Iteration, Solve, is_installed
+from gibiane_ops.kernels.errors import BadValue, MissingPackage, SingularSystem, TooLarge
+from gibiane_ops.kernels.packages import DIRECT, MODULES, Solve, is_installed
 
 RESIDUAL_LIMIT = 1e-9
 """Largest accepted norm of ``A x - b`` over that of ``b`` (largest entry, column by column)."""
 
 SINGULAR_LIMIT = 1e-14
-"""A matrix scaled to a unit diagonal is singular when ``x.A.x / x.x`` falls below this; round-off gives 1e-16."""
-
-SUPERLU_LIMIT = 30_000
-"""Number of unknowns above which SuperLU is some fifty times slower than a supernodal package."""
+"""A matrix scaled to a unit diagonal is singular when an eigenvalue falls below this; round-off gives 1e-16."""
 
 SAMPLED_COLUMNS = 4
 """Number of right-hand sides above which one random combination of them is checked."""
 
+ITERATIVE = ("amg", "cg", "minres")
+FAILURES = (RuntimeError, ValueError, ArithmeticError, MemoryError)
+
 
 class Factor:
-    """A factorised matrix that solves, checks its answer, and changes package when the answer is bad.
+    """A factorised or preconditioned matrix that solves, checks its answer, and changes package when it is bad.
 
     Attributes
     ----------
     name : str
-        Package in use: ``rslab``, ``pardiso``, ``superlu``, ``amg`` or ``cg``.
+        In use: ``single`` (rslab in single precision, corrected), ``rslab``, ``pardiso``, ``superlu``, ``amg``,
+        ``cg`` or ``minres``.
     residual : float
         Largest relative residual met so far.
     notes : tuple of str
@@ -50,7 +51,9 @@ class Factor:
         self._tolerance = tolerance
         self._limit = max(RESIDUAL_LIMIT, 10 * tolerance)
         self._notes: list[str] = []
-        self._scale = _diagonal_scale(A)
+        self._scale, self._definite = _diagonal_scale(A)
+        if not self._definite:
+            self._packages = [name for name in names if name not in ("single", "amg", "cg")]
         self.name = ""
         self.residual = 0.0
         self._solve: Solve = np.copy
@@ -64,8 +67,13 @@ class Factor:
 
     @property
     def iterations(self) -> int:
-        """Iterations of the last solve, 0 for a factorisation."""
-        return self._solve.iterations if isinstance(self._solve, Iteration) else 0
+        """Iterations of the last solve, 0 for a factorisation in double precision."""
+        return int(getattr(self._solve, "iterations", 0))
+
+    @property
+    def negative(self) -> int | None:
+        """Number of negative eigenvalues that a factorisation met; None when it does not tell."""
+        return getattr(self._solve, "negative", 0 if self._definite else None)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -101,16 +109,26 @@ class Factor:
         if b.size == 0:
             return np.zeros_like(b)
         while True:
-            x = self._solve(b)
-            residual, good = self._check(x, b)
-            if not good:
-                x = x + self._solve(b - self._A @ x)
+            try:
+                x = self._solve(b)
                 residual, good = self._check(x, b)
+                if not good:
+                    x = x + self._solve(b - self._A @ x)
+                    residual, good = self._check(x, b)
+            except FAILURES as error:
+                self._note(f"{self.name}: no solution ({error})")
+                self._next_package()
+                continue
             if good:
                 self.residual = max(self.residual, residual)
                 return x
-            self._notes.append(f"{self.name}: relative residual {residual:.1e} after one refinement, answer discarded")
+            self._note(f"{self.name}: relative residual {residual:.1e} after one refinement, answer discarded")
             self._next_package()
+
+    def _note(self, text: str) -> None:
+        # that single precision does not suffice is no failure: double precision follows
+        if self.name != "single":
+            self._notes.append(text)
 
     def _check(self, x: FloatArray, b: FloatArray) -> tuple[float, bool]:
         """Give the relative residual and whether it is small, or as small as double precision can make it."""
@@ -130,47 +148,74 @@ class Factor:
         if not good.all():
             floor = np.abs(self._A) @ np.abs(x) + np.abs(b)
             weight = 1 / self._scale**2
-            null = np.abs((x * (self._A @ x)).sum(axis=0)) <= SINGULAR_LIMIT * (weight @ x**2)
+            null = self._weakness(x) <= SINGULAR_LIMIT
             good |= (r <= 64 * np.finfo(float).eps * floor.max(axis=0)) & ~null
         return relative, bool(good.all())
+
+    def _weakness(self, x: FloatArray) -> FloatArray:
+        """Bound the smallest eigenvalue of the scaled matrix by each column of x: tiny for a null vector."""
+        Ax = self._A @ x
+        scale = self._scale if x.ndim == 1 else self._scale[:, None]
+        size = ((x / scale) ** 2).sum(axis=0)
+        # of an indefinite matrix the quotient of Rayleigh can vanish without a null vector
+        value = np.abs((x * Ax).sum(axis=0)) if self._definite else np.sqrt((scale**2 * Ax**2).sum(axis=0) * size)
+        return np.asarray(np.divide(value, size, out=np.full_like(size, np.inf), where=size > 0))
 
     def _next_package(self) -> None:
         while self._packages:
             self.name = self._packages.pop(0)
+            self._solve = np.copy
             try:
                 self._solve = self._factorize(self._A)
-            except (RuntimeError, ValueError, ArithmeticError) as error:
-                self._notes.append(f"{self.name}: factorisation failed ({error})")
-                self._raise_if_singular(shifted=True)
+            except TooLarge as error:
+                if not self._packages:
+                    raise
+                self._note(str(error))
                 continue
+            except FAILURES as error:
+                self._note(f"{self.name}: factorisation failed ({error})")
+                if self.name in DIRECT:
+                    self._raise_if_singular(shifted=True)
+                continue
+            if getattr(self._solve, "negative", 0):
+                self._definite = False
             if self.name in DIRECT:
                 self._raise_if_singular(shifted=False)
             n = self._A.shape[0]
-            if self.name == "superlu" and n > SUPERLU_LIMIT:
-                self._notes.append(f"{n} unknowns factorised by SuperLU, slow at this size; pip install rslab")
+            if self.name == "superlu" and n > packages.SUPERLU_LIMIT:
+                missing = [MODULES[name] for name in DIRECT if not is_installed(name)]
+                advice = f"; pip install {missing[0]}" if missing else ""
+                self._notes.append(f"{n} unknowns factorised by SuperLU, slow at this size{advice}")
             return
         raise SingularSystem("; ".join(self._notes) or "no package could factorise the matrix")
 
     def _raise_if_singular(self, shifted: bool) -> None:
         """Look for a null vector by inverse iteration; the matrix itself confirms it, whatever the package did."""
         # a factorisation that broke down is repeated on a slightly shifted matrix, which has the same null vectors
-        solve = (
-            self._factorize(self._A + sp.diags_array(1e-8 / self._scale**2, format="csr")) if shifted else self._solve
-        )
+        try:
+            solve = (
+                self._factorize(self._A + sp.diags_array(1e-8 / self._scale**2, format="csr"))
+                if shifted
+                else self._solve
+            )
+        except FAILURES:
+            return
         x = np.random.default_rng(0).standard_normal(self._A.shape[0]) / self._scale
         for _ in range(3 if shifted else 1):
             x = solve(x)
             if not np.isfinite(x).all():
                 return
-            size = float(np.linalg.norm(x / self._scale))
-            x = x / size
-            if abs(float(x @ (self._A @ x))) <= SINGULAR_LIMIT:
+            x = x / float(np.linalg.norm(x / self._scale))
+            # of an indefinite matrix round-off in the residual itself is larger
+            if self._weakness(x) <= SINGULAR_LIMIT * (1 if self._definite else 10):
                 unknowns = np.flatnonzero(np.abs(x) >= 0.5 * np.abs(x).max())
                 raise SingularSystem(f"the matrix is singular ({self.name})", unknowns=unknowns)
             x = x / self._scale**2
 
     def _factorize(self, A: sp.csr_array) -> Solve:
         match self.name:
+            case "single":
+                return iterations.single(A)
             case "rslab":
                 return packages.rslab(A)
             case "pardiso":
@@ -178,9 +223,12 @@ class Factor:
             case "superlu":
                 return packages.superlu(A)
             case "amg":
-                return packages.amg(A, self._near_null, self._block, self._tolerance)
+                patient = not any(name in DIRECT for name in self._packages)
+                return iterations.amg(A, self._near_null, self._block, self._tolerance, patient=patient)
+            case "cg":
+                return iterations.cg(A, self._block, self._tolerance)
             case _:
-                return packages.cg(A, self._block, self._tolerance)
+                return iterations.Minres(A, self._tolerance)
 
 
 def factorize(
@@ -192,15 +240,17 @@ def factorize(
     tolerance: float = 1e-10,
     reserve: bool = True,
 ) -> Factor:
-    """Factorise a symmetric positive definite sparse matrix.
+    """Factorise or precondition a symmetric sparse matrix.
 
     Parameters
     ----------
-    A : (n, n) sparse, symmetric positive definite
+    A : (n, n) sparse, symmetric
     method : str
         ``auto`` takes the first installed direct package among rslab, pardiso (pypardiso), superlu (SciPy) and keeps
-        the others in reserve. The name of a package takes that one only. ``amg`` takes conjugate gradients with an
-        algebraic multigrid preconditioner (pyamg), ``cg`` with the diagonal blocks; direct packages in reserve.
+        the others in reserve. ``single`` tries rslab in single precision first, each solution corrected to double:
+        half the time and memory, for few right-hand sides. The name of a package takes that one only. ``amg`` takes
+        conjugate gradients with an algebraic multigrid preconditioner, ``cg`` with the diagonal blocks, ``minres``
+        allows negative eigenvalues; direct packages in reserve.
     near_null : (n, k) float64, optional
         Rigid-body modes, used by ``amg`` only; for 3D elasticity without them it converges slowly.
     block : int
@@ -218,6 +268,8 @@ def factorize(
     ------
     SingularSystem
         When a null vector is found or no package can factorise the matrix.
+    TooLarge
+        When no package has memory enough.
     MissingPackage
         When ``method`` names a package that is not installed.
     BadValue
@@ -226,7 +278,9 @@ def factorize(
     Notes
     -----
     The matrix is called singular when one inverse iteration from a random vector finds an x with
-    ``x.A.x <= 1e-14 x.D.x``, D the diagonal of A. The measure does not depend on units nor on the package.
+    ``x.A.x <= 1e-14 x.D.x``, D the diagonal of A; of an indefinite matrix, with a residual as small. The measure does
+    not depend on units nor on the package. An indefinite matrix is recognised by its diagonal, by negative pivots, or
+    by a direction of negative energy that conjugate gradients meet.
 
     Cost
     ----
@@ -236,23 +290,34 @@ def factorize(
         A = sp.csr_array(A, dtype=np.float64)
     if not np.isfinite(A.data).all():
         raise BadValue("matrix entry", float(A.data[~np.isfinite(A.data)][0]), "a finite value")
-    if method == "auto":
-        names = tuple(name for name in DIRECT if is_installed(name))
-    elif method not in MODULES:
-        raise BadValue("method", method, "one of auto, " + ", ".join(MODULES))
-    elif not is_installed(method):
-        raise MissingPackage(MODULES[method], f"pip install {MODULES[method]}")
-    elif method in ("amg", "cg"):
-        names = (method, *(name for name in DIRECT if reserve and is_installed(name)))
-    else:
-        names = (method,)
+    installed = tuple(name for name in DIRECT if is_installed(name))
+    match method:
+        case "auto":
+            names = installed
+        case "single":
+            names = ("single", *installed) if is_installed("rslab") else installed
+        case "amg" | "cg" | "minres":
+            last = () if method == "minres" else ("minres",)
+            names = (method, *(installed if reserve else last))
+        case _ if method not in MODULES:
+            raise BadValue("method", method, "one of auto, single, " + ", ".join((*MODULES, *ITERATIVE)))
+        case _ if not is_installed(method):
+            raise MissingPackage(MODULES[method], f"pip install {MODULES[method]}")
+        case _:
+            names = (method,)
     return Factor(A, names, near_null, block, tolerance)
 
 
-def _diagonal_scale(A: sp.csr_array) -> FloatArray:
-    """Give the scaling that makes the diagonal 1; a zero or negative diagonal is no positive definite matrix."""
+def _diagonal_scale(A: sp.csr_array) -> tuple[FloatArray, bool]:
+    """Give the scaling that makes the diagonal 1, and whether the matrix may be positive definite.
+
+    Without a positive diagonal it is not; rows are then scaled by their largest entry.
+    """
     diagonal = A.diagonal()
-    bad = np.flatnonzero(~(diagonal > 0))
-    if len(bad):
-        raise SingularSystem("unknowns without stiffness", unknowns=bad)
-    return np.asarray(1 / np.sqrt(diagonal))
+    if (diagonal > 0).all():
+        return np.asarray(1 / np.sqrt(diagonal)), True
+    size = np.asarray(abs(A).max(axis=1).todense()).ravel()
+    empty = np.flatnonzero(size == 0)
+    if len(empty):
+        raise SingularSystem("unknowns without stiffness", unknowns=empty)
+    return np.asarray(1 / np.sqrt(size)), False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NoReturn
 
@@ -26,11 +27,13 @@ ENERGY_LIMIT = 1e-6
 ROUND_OFF = 1e-13
 
 METHODS = {
+    "single": "sparse LDLt in single precision (rslab), corrected to double",
     "rslab": "sparse LDLt (rslab)",
     "pardiso": "sparse Cholesky (PARDISO)",
     "superlu": "sparse LU (SuperLU)",
-    "amg": "conjugate gradients with algebraic multigrid (pyamg)",
+    "amg": "conjugate gradients with algebraic multigrid",
     "cg": "conjugate gradients with block diagonal preconditioner",
+    "minres": "MINRES, for an indefinite matrix",
 }
 
 
@@ -113,26 +116,36 @@ def solve_linear(
     if not system.symmetric:
         return _unsymmetric(ctx, system, reduction, F)
     wish = _wish(ctx)
+    definite = bool((system.K.diagonal()[reduction.free] > 0).all())
+    space = int(ctx.option("DIME"))
 
-    def choice(solutions: int) -> Choice:
-        entries, dim = system.K.nnz, system.dim
-        return choose(len(reduction.free), entries, dim, solutions, wish=wish, elastic=system.names in ELASTIC)
+    def choice(solutions: int, memory: float | None = None) -> Choice:
+        elastic = system.names in ELASTIC or system.dim == 1
+        size = len(reduction.free), system.K.nnz, space, solutions
+        return choose(*size, wish=wish, definite=definite, elastic=elastic, memory=memory)
 
     def make(solutions: int) -> _Solver:
         check_held(ctx, system)
-        return _factorised(ctx, system, reduction, choice(solutions), wish, precision)
+        chosen = choice(solutions)
+        try:
+            return _prepared(ctx, system, reduction, chosen, wish, precision)
+        except k_errors.TooLarge as failure:
+            if wish == "DIRE":
+                _too_large(ctx, failure)
+            return _prepared(ctx, system, reduction, choice(solutions, memory=0.0), wish, precision)
 
     count = F.shape[1]
     extra = system.C.shape[0], wish, precision
     solver: _Solver = kept(ctx, "factor", k, extra, lambda: make(count))
     solver.solved += count
-    if solver.choice.method != "auto" and choice(solver.solved).method == "auto":
+    if not solver.choice.direct and choice(solver.solved).direct:
         ctx.state["factors"].clear()
         total = solver.solved
         solver = kept(ctx, "factor", k, extra, lambda: make(total))
         solver.solved = total
     v = _solution(ctx, system, reduction, solver, reduction.load(system.K, F))
     tell_notes(ctx, solver.factor)
+    _tell_solution(ctx, solver.factor)
     u = reduction.expand(v)
     r = reduction.reactions(system.K, u, F)
     _check_energy(ctx, system, u, F, r)
@@ -151,6 +164,32 @@ def _unsymmetric(ctx: Context, system: System, reduction: Reduction, F: FloatArr
     return [system.field(u[:, i], m[:, i]) for i in range(F.shape[1])]
 
 
+def _bytes(size: float) -> str:
+    return f"{size / 1e9:.2g} Gbyte" if size >= 1e9 else f"{max(size / 1e6, 1):.0f} Mbyte"
+
+
+def _too_large(ctx: Context, failure: k_errors.TooLarge) -> NoReturn:
+    ctx.fail(
+        "G414",
+        "{what} would need {needed} of memory, the limit is {limit}",
+        at="k",
+        what=failure.what,
+        needed=f"{failure.needed / 1e9:.3g} GB",
+        limit=f"{failure.limit / 1e9:.3g} GB",
+        hint="OPTI 'RESO' 'ITER' needs much less memory",
+    )
+
+
+def _tell_solution(ctx: Context, factor: Factor) -> None:
+    """Say how far a solver went."""
+    if ctx.option("ECHO") >= 1 and factor.shape[0]:
+        count = f"{factor.iterations} iterations, " if factor.iterations else ""
+        minus = f", {factor.negative} negative eigenvalues" if factor.negative else ""
+        # the next power of ten: round-off itself is no information
+        reached = 10.0 ** math.ceil(math.log10(max(factor.residual, 1e-12)))
+        ctx.write(f" RESO : {count}relative residual below {reached:.0e}{minus}")
+
+
 def _wish(ctx: Context) -> str:
     word = str(ctx.session.options.get("RESO") or "")[:4]
     if word not in ("", "DIRE", "ITER"):
@@ -158,16 +197,16 @@ def _wish(ctx: Context) -> str:
     return word
 
 
-def _factorised(
+def _prepared(
     ctx: Context, system: System, reduction: Reduction, choice: Choice, wish: str, precision: float | None
 ) -> _Solver:
     """Say the choice and prepare the solver."""
     if ctx.option("ECHO") >= 1:
         name = choice.method if choice.method != "auto" else next(p for p in DIRECT if is_installed(p))
-        ctx.write(f" RESO : {len(reduction.free)} equations, {METHODS[name]}, about {choice.memory / 1e9:.2g} Gbyte")
+        ctx.write(f" RESO : {len(reduction.free)} equations, {METHODS[name]}, about {_bytes(choice.memory)}")
     try:
-        if choice.method == "auto":
-            return _Solver(factorize(reduction.matrix(system.K)), choice)
+        if choice.direct:
+            return _Solver(factorize(reduction.matrix(system.K), method=choice.method), choice)
         modes = None
         if system.names in ELASTIC:
             modes = rigid_modes(system.points, system.points.mean(axis=0))
@@ -184,13 +223,13 @@ def _factorised(
             reserve=choice.reserve,
         )
     except k_errors.SingularSystem as failure:
-        singular(ctx, system, failure, reduction.free if choice.method == "auto" else np.arange(reduction.n))
+        singular(ctx, system, failure, reduction.free if choice.direct else np.arange(reduction.n))
     return _Solver(factor, choice)
 
 
 def _solution(ctx: Context, system: System, reduction: Reduction, solver: _Solver, load: FloatArray) -> FloatArray:
     """Return the free unknowns, (n_free, k)."""
-    whole = solver.choice.method != "auto"
+    whole = not solver.choice.direct
     try:
         if not whole:
             return solver.factor.solve(load)

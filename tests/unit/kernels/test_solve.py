@@ -4,9 +4,22 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import packages, solve
-from gibiane_ops.kernels.errors import BadValue, SingularSystem
+from gibiane_ops.kernels import iterations, packages, solve
+from gibiane_ops.kernels.errors import BadValue, SingularSystem, TooLarge
 from gibiane_ops.kernels.solve import factorize
+
+PARDISO = pytest.param(
+    "pardiso",
+    marks=pytest.mark.skipif(
+        not packages.is_installed("pardiso"), reason="PARDISO IS NOT TESTED HERE: pip install pypardiso"
+    ),
+)
+
+
+@pytest.fixture
+def two_packages(monkeypatch):
+    """rslab and SuperLU, whatever else is installed."""
+    monkeypatch.setattr(solve, "is_installed", lambda name: name in ("rslab", "superlu"))
 
 
 def chain(n, stiffness=1.0, held=True):
@@ -25,7 +38,7 @@ def laplacian3(n):
     return sp.csr_matrix(sp.kron(plane, eye) + sp.kron(sp.identity(n * n), one))
 
 
-@pytest.mark.parametrize("method", ["auto", "rslab", "superlu", "amg", "cg"])
+@pytest.mark.parametrize("method", ["auto", "single", "rslab", PARDISO, "superlu", "amg", "cg", "minres"])
 @pytest.mark.parametrize("shape", [(343,), (343, 1), (343, 70)])
 def test_solves_one_and_several_right_hand_sides(method, shape):
     A = laplacian3(7)
@@ -42,7 +55,7 @@ def test_chain_of_springs_pulled_at_its_end():
     np.testing.assert_allclose(factorize(chain(6, 3.0)).solve(np.r_[np.zeros(5), 1.0]), np.arange(1, 7) / 3, rtol=1e-13)
 
 
-@pytest.mark.parametrize("method", ["auto", "superlu", "amg"])
+@pytest.mark.parametrize("method", ["auto", "single", PARDISO, "superlu", "amg"])
 @pytest.mark.parametrize("stiffness", [1e-9, 1.0, 1e12])
 def test_free_chain_is_singular_whatever_the_units(method, stiffness):
     with pytest.raises(SingularSystem) as caught:
@@ -75,7 +88,7 @@ def test_stiff_but_regular_system_is_accepted():
     assert x[39] == pytest.approx(39, rel=1e-6)
 
 
-def test_a_wrong_package_is_replaced(monkeypatch):
+def test_a_wrong_package_is_replaced(monkeypatch, two_packages):
     monkeypatch.setattr(packages, "rslab", lambda A: lambda b: 2 * b)
     factor = factorize(chain(20))
     x = factor.solve(np.ones(20))
@@ -94,7 +107,7 @@ def test_a_slightly_wrong_package_is_refined(monkeypatch):
 
 
 @pytest.mark.parametrize("column", [0, 17, 39])
-def test_one_wrong_column_among_many_is_found(monkeypatch, column):
+def test_one_wrong_column_among_many_is_found(monkeypatch, two_packages, column):
     good = packages.superlu
 
     def slips(A):
@@ -114,7 +127,7 @@ def test_one_wrong_column_among_many_is_found(monkeypatch, column):
     assert (np.abs(chain(20) @ x - b).max(axis=0) <= 1e-9 * np.abs(b).max(axis=0)).all()
 
 
-def test_a_failing_package_is_replaced(monkeypatch):
+def test_a_failing_package_is_replaced(monkeypatch, two_packages):
     def fails(A):
         if A[0, 0] == 2.0:
             raise RuntimeError("zero pivot")
@@ -133,8 +146,91 @@ def test_no_package_left(monkeypatch):
 
 
 def test_superlu_note_above_its_size(monkeypatch):
-    monkeypatch.setattr(solve, "SUPERLU_LIMIT", 10)
+    monkeypatch.setattr(packages, "SUPERLU_LIMIT", 10)
+    monkeypatch.setattr(solve, "is_installed", lambda name: name == "superlu")
     assert "pip install rslab" in factorize(chain(20), method="superlu").notes[0]
+
+
+def indefinite(n, shift):
+    return sp.csr_array(laplacian3(n) - shift * sp.identity(n**3))
+
+
+@pytest.mark.parametrize("method", ["auto", "single", "rslab", PARDISO, "superlu", "amg", "cg", "minres"])
+@pytest.mark.parametrize("shift", [2.0, 6.9])
+def test_an_indefinite_matrix_is_solved_by_every_method(method, shift):
+    # shift 6.9 makes the diagonal negative, shift 2 does not show there
+    A = indefinite(8, shift)
+    x = np.random.default_rng(3).standard_normal((512, 3))
+    factor = factorize(A, method=method, reserve=False)
+    np.testing.assert_allclose(factor.solve(A @ x), x, rtol=0, atol=1e-6)
+    below = int((np.linalg.eigvalsh(A.toarray()) < 0).sum())
+    if factor.name in ("rslab", "pardiso"):
+        assert factor.negative == below
+    if method in ("amg", "cg", "minres"):
+        assert factor.name == "minres"
+        assert factor.iterations > 0
+
+
+@pytest.mark.parametrize("method", ["auto", "superlu", PARDISO])
+def test_an_indefinite_matrix_without_a_diagonal(method):
+    A = sp.csr_array(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 2.0], [0.0, 2.0, 1.0]]))
+    np.testing.assert_allclose(A @ factorize(A, method=method).solve(np.r_[1.0, 2.0, 3.0]), [1, 2, 3], atol=1e-13)
+
+
+@pytest.mark.parametrize("method", ["auto", PARDISO])
+def test_a_singular_indefinite_matrix_is_named(method):
+    A = sp.block_diag([sp.csr_array([[0.0, 1.0], [1.0, 0.0]]), chain(20, held=False)], format="csr")
+    with pytest.raises(SingularSystem):
+        factorize(A, method=method).solve(np.ones(22))
+
+
+def test_single_precision_gives_double_precision():
+    A = laplacian3(9)
+    b = np.random.default_rng(4).standard_normal((729, 3))
+    factor = factorize(A, method="single")
+    assert np.abs(A @ factor.solve(b) - b).max() < 1e-13 * np.abs(b).max()
+    assert (factor.name, factor.notes) == ("single", ())
+    assert 2 <= factor.iterations <= 5
+
+
+def test_what_is_too_stiff_for_single_precision_goes_to_double_without_a_note(two_packages):
+    A = chain(40).tolil()
+    A[9:11, 9:11] += 1e10 * np.array([[1, -1], [-1, 1]])
+    factor = factorize(A, method="single")
+    assert (factor.name, factor.notes) == ("rslab", ())
+    assert factor.solve(np.r_[np.zeros(39), 1.0])[39] == pytest.approx(39, rel=1e-5)
+
+
+def test_what_does_not_fit_into_memory_is_refused_before_it_starts(monkeypatch):
+    monkeypatch.setattr(packages, "available_memory", lambda: 1e3)
+    with pytest.raises(TooLarge) as caught:
+        factorize(laplacian3(7), method="rslab")
+    assert caught.value.limit == 1e3 < caught.value.needed
+
+
+def test_multigrid_that_does_not_converge_gives_way_to_a_factorisation(monkeypatch, two_packages):
+    monkeypatch.setattr(iterations, "FEW_ITERATIONS", 2)
+    factor = factorize(laplacian3(12), method="amg")
+    factor.solve(np.ones(1728))
+    assert factor.name == "rslab"
+    assert "2 iterations leave" in factor.notes[0]
+
+
+@pytest.mark.skipif(not packages.is_installed("pardiso"), reason="PARDISO IS NOT TESTED HERE: pip install pypardiso")
+def test_pardiso_gives_its_memory_back():
+    from pypardiso import PyPardisoSolver
+
+    freed = []
+    solver = PyPardisoSolver.free_memory
+    try:
+        PyPardisoSolver.free_memory = lambda self: (freed.append(self), solver(self))
+        factor = factorize(laplacian3(5), method="pardiso")
+        factor.solve(np.ones(125))
+        assert freed == []
+        del factor
+        assert len(freed) == 1
+    finally:
+        PyPardisoSolver.free_memory = solver
 
 
 def test_bad_input():
