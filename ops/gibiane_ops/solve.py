@@ -27,8 +27,8 @@ RESO = operator(
     summary="solve a linear system with its conditions, and contact with friction",
     notice="`U = RESO K F`: K joins stiffness, conditions (BLOQ, SYMT, RELA) and contact conditions (RIGI of a contact "
     "model) by ET; F joins loads, imposed values (DEPI) and gaps. Several second members, a LISTCHPO of them, and "
-    "further calls with the same matrices share one factorisation. A few solutions of a large solid come from conjugate gradients "
-    "with algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into "
+    "further calls with the same matrices share one factorisation. A few solutions of a large solid come from "
+    "conjugate gradients with algebraic multigrid, to the relative residual PREC (1.E-10), and so does every one that would not fit into "
     "the memory; OPTI 'RESO' 'DIRE' or 'ITER' chooses instead, OPTI 'ECHO' 1 tells. A matrix with negative eigenvalues "
     "is solved too, by factorisation or MINRES. "
     "Conditions with MINI or MAXI act like "

@@ -36,6 +36,7 @@ class Iteration:
         Euclidean norm of the residual over that of the right-hand side, column by column.
     most : int
         Largest number of iterations.
+
     Attributes
     ----------
     iterations : int
@@ -63,7 +64,8 @@ class Iteration:
         Raises
         ------
         ArithmeticError
-            When the iterations do not suffice, or a direction of no or negative energy shows that the matrix is not positive definite.
+            When the iterations do not suffice, or a direction of no or negative energy shows that the matrix is not
+            positive definite.
         """
         self.iterations = 0
         columns = b.reshape(len(b), -1)

@@ -98,9 +98,7 @@ def _pardiso(upper: sp.csr_array, kind: int) -> Factored:
 
 
 def superlu(A: sp.sparray) -> Factored:
-    """Factorise by SciPy's SuperLU: rows and columns ordered alike, by columns with pivoting where a diagonal is not
-    positive.
-    """
+    """Factorise by SciPy's SuperLU, with pivoting where an entry of the diagonal is not positive."""
     from scipy.sparse.linalg import splu
 
     matrix = A.tocsc()

@@ -1,7 +1,7 @@
 """Solve symmetric sparse systems, with whatever package is installed, and check every answer.
 
-Packages may be young, missing or wrong: a bad residual is refined once, then the next package takes over and a note says
-so. A singular matrix is recognised by its own null vector, never by a package.
+Packages may be young, missing or wrong: a bad residual is refined once, then the next package takes over and a note
+says so. A singular matrix is recognised by its own null vector, never by a package.
 """
 
 from __future__ import annotations
@@ -147,7 +147,6 @@ class Factor:
         good = r <= self._limit * size
         if not good.all():
             floor = np.abs(self._A) @ np.abs(x) + np.abs(b)
-            weight = 1 / self._scale**2
             null = self._weakness(x) <= SINGULAR_LIMIT
             good |= (r <= 64 * np.finfo(float).eps * floor.max(axis=0)) & ~null
         return relative, bool(good.all())
