@@ -24,7 +24,7 @@ VISITS = 3
 """Improvements in a sweep, over the number of stars: the first sweep begins with one of each star."""
 
 BEST, SHARE, LEAST = 0.4, 1.0 / 16, 48
-"""Stars chosen together: the best, until they gained this part of what all gained last time, and at least this share and number."""
+"""Stars chosen together: the best, that had this part of the last gains, and at least this share and this number."""
 
 
 def jumps(mesh: Simplices, tau: FloatArray, stress: FloatArray, cells: IntArray | slice = slice(None)) -> FloatArray:
