@@ -9,6 +9,7 @@ from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, MCHAML, MMODEL
 from gibiane_ops.kernels.estimate.contact import densities
 from gibiane_ops.values.champs import DIFFUS, ChPoint, MChaml
+from gibiane_ops.values.conditions import family
 from gibiane_ops.values.contact import solved_contacts
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
@@ -44,14 +45,18 @@ COFR = operator(
     gives=[CHPOINT],
 )
 def _cofr(ctx: Context, mc: Modele, u: ChPoint, rea: ChPoint, matc: MChaml | None, lump: bool) -> ChPoint:
-    store = node_store(ctx)
+    store, axis = node_store(ctx), family(ctx) == "AXIS"
     columns: dict[str, list[tuple[IntArray, FloatArray]]] = {}
     for zone in solved_contacts(ctx, mc, matc, u, rea):
         nodes = zone.pairs.pairs[:, 0]
         dim = zone.frames.shape[1]
         in_space = np.einsum("nij,ni->nj", zone.frames, zone.force)
-        R = densities(store.coords[:, :dim], zone.zone.slave.kernel_blocks, nodes, in_space, lumped=lump)
-        local = np.einsum("nij,nj->ni", zone.frames, R)
+        if zone.is_mortar:
+            local = zone.pair_force / zone.pairs.area[:, None]
+        else:
+            surface = zone.zone.slave.kernel_blocks
+            R = densities(store.coords[:, :dim], surface, nodes, in_space, lumped=lump, axisymmetric=axis)
+            local = np.einsum("nij,nj->ni", zone.frames, R)
         scale = np.abs(zone.pair_force).max(initial=0.0)
         slip = np.linalg.norm(zone.pair_relative[:, 1:], axis=1)
         closed = -zone.pair_force[:, 0] > 1e-9 * scale

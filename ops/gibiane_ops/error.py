@@ -157,6 +157,7 @@ def _contact_part(
             state.gap,
             state.mu,
             variant,
+            axisymmetric=mode == "AXIS",
         )
     return found.facet, facet_zones(ctx, state, found.facet, mode)
 

@@ -227,6 +227,11 @@ class SolvedContact:
     mu: FloatArray
     motion: float
 
+    @property
+    def is_mortar(self) -> bool:
+        """Whether forces are those of dual multipliers: over the area of a node they are tractions."""
+        return self.zone.kinematics == "MORT" and (self.zone.rigid or len(self.pairs.row) > 0)
+
 
 def solved_contacts(
     ctx: Context, model: Modele, material: MChaml | None, u: ChPoint, reaction: ChPoint, at: str = "mc"
@@ -237,6 +242,10 @@ def solved_contacts(
         ctx.fail(26, "this model has no contact zone", at=at, hint="MODE G1 G2 'CONTACT' ... makes one")
     for zone in model.contacts:
         pairs = zone_pairs(ctx, zone, at)
+        # forces of a node on a sharp edge are known together: it counts for the side that comes first
+        first = np.unique(pairs.pairs[:, 0], return_index=True)[1]
+        if len(first) < len(pairs.pairs):
+            pairs = pairs.only(np.sort(first))
         frames, _, _ = local_frames(pairs.normals, np.ones(pairs.normals.shape, bool))
         values = material.zone_of(zone) if material is not None else None
         slave = pairs.pairs[:, 0]

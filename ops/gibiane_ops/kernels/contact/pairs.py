@@ -163,6 +163,20 @@ class ContactPairs:
         side = np.full(len(m), -SHIFT / (1 - 2 * SHIFT))
         return sp.csr_array((np.concatenate([diagonal, side, side]), (row, column)), shape=(n, n))
 
+    def only(self, kept: IntArray) -> ContactPairs:
+        """Keep some pairs; a middle must keep its corners."""
+        new = np.full(len(self.pairs), -1, np.int64)
+        new[kept] = np.arange(len(kept))
+        used = new[self.row] >= 0
+        marked = [place[place >= 0] for place in (new[self.not_facing], new[self.penetrating])]
+        given = [values[kept] if len(values) else values for values in (self.area, self.size)]
+        return ContactPairs(
+            self.pairs[kept], self.normals[kept], self.gap[kept], self.points[kept], self.zone[kept],
+            self.unpaired_slave, self.unpaired_master, *marked,
+            new[self.row[used]], self.node[used], self.coefficient[used],
+            new[self.middles[new[self.middles[:, 0]] >= 0]], *given,
+        )  # fmt: skip
+
     def on_changed_basis(self) -> ContactPairs:
         """Take entries and gaps that were written for plain nodes to the changed basis of quadratic facets."""
         if not len(self.middles):
@@ -323,19 +337,13 @@ def with_surface(pairs: ContactPairs, points: FloatArray, slave: Sequence[Block]
     place = np.searchsorted(surface.nodes, pairs.pairs[:, 0])
     kept = np.flatnonzero(np.isin(place, _with_corners(surface, place)))
     place = place[kept]
-    old = np.full(len(pairs.pairs), -1, np.int64)
-    old[kept] = np.arange(len(kept))
     found = replace(
-        pairs,
-        pairs=pairs.pairs[kept], normals=pairs.normals[kept], gap=pairs.gap[kept], points=pairs.points[kept],
-        zone=pairs.zone[kept],
-        not_facing=old[pairs.not_facing][old[pairs.not_facing] >= 0],
-        penetrating=old[pairs.penetrating][old[pairs.penetrating] >= 0],
+        pairs.only(kept),
         unpaired_slave=np.setdiff1d(surface.nodes, surface.nodes[place]),
         middles=_middles(surface, place),
         area=integrals(points, surface, axisymmetric)[place],
         size=surface.size[place],
-    )  # fmt: skip
+    )
     return replace(found, gap=found.on_pairs(found.gap))
 
 

@@ -43,7 +43,13 @@ class ContactError:
 
 
 def densities(
-    points: FloatArray, facets: Sequence[Block], nodes: IntArray, force: FloatArray, *, lumped: bool = False
+    points: FloatArray,
+    facets: Sequence[Block],
+    nodes: IntArray,
+    force: FloatArray,
+    *,
+    lumped: bool = False,
+    axisymmetric: bool = False,
 ) -> FloatArray:
     """Turn nodal contact forces into tractions.
 
@@ -58,6 +64,8 @@ def densities(
         Global components.
     lumped : bool
         Divide by the row sums of M instead of solving.
+    axisymmetric : bool
+        Forces are those once round the axis; the first coordinate is the radius.
 
     Returns
     -------
@@ -68,7 +76,10 @@ def densities(
     ----
     One factorisation of size k.
     """
-    masses = [(_local(nodes, cells), assembly.face_mass(shape(name), points[cells])) for name, cells in facets]
+    masses = [
+        (_local(nodes, cells), assembly.element_mass(shape(name), points[cells], axisymmetric=axisymmetric))
+        for name, cells in facets
+    ]
     # A node without contact keeps a zero density: its row and column drop out.
     M = assembly.assemble(len(nodes) + 1, 1, masses)[: len(nodes), : len(nodes)]
     if lumped:
@@ -94,6 +105,8 @@ def contact_error(
     gap: FloatArray,
     mu: float | FloatArray,
     variant: str = "DENS",
+    *,
+    axisymmetric: bool = False,
 ) -> ContactError:
     """Measure the violation of the contact and friction laws, facet by facet.
 
@@ -116,6 +129,8 @@ def contact_error(
         Friction coefficient; infinity for tied tangential motion.
     variant : {'DENS', 'NODE', 'DLUM'}
         Tractions from the consistent mass, no tractions at all (sum over nodes), tractions from the lumped mass.
+    axisymmetric : bool
+        Forces and errors are those once round the axis.
 
     Returns
     -------
@@ -143,7 +158,8 @@ def contact_error(
     raw = force
     if variant != "NODE":
         in_space = np.einsum("nij,ni->nj", frames, force)
-        raw = np.einsum("nij,nj->ni", frames, densities(points, facets, nodes, in_space, lumped=variant == "DLUM"))
+        R = densities(points, facets, nodes, in_space, lumped=variant == "DLUM", axisymmetric=axisymmetric)
+        raw = np.einsum("nij,nj->ni", frames, R)
     R = radial_projection(raw, coefficient)
     corrected = int((norms(R - raw) > 1e-9 * norms(raw).max(initial=0.0)).sum())
     normal_motion = np.minimum(relative[:, 0] - gap, 0.0)
@@ -160,6 +176,8 @@ def contact_error(
             face = shape(name)
             xi, weights = face.mass_gauss
             measure = geometry.measure_densities(face, points[cells], xi) * weights
+            if axisymmetric:
+                measure = measure * geometry.circumferences(face, points[cells], xi)
             at = _interpolate(face.N(xi), fields[_local(nodes, cells)])
             parts.append(np.asarray((measure * _work(at, frames.shape[1])).sum(axis=1), np.float64))
     return ContactError(parts, R, corrected)
