@@ -15,6 +15,9 @@ BoolArray = NDArray[np.bool_]
 NONE = 1e-10
 """Coefficients below this one are round-off."""
 
+HELD = 0.5
+"""A component of the normal above this one is what contact acts on."""
+
 WORST = 1e8
 """Largest displacement that a unit relative displacement may cause."""
 
@@ -81,8 +84,8 @@ def _interpolated(
     G = _cleaned(rows @ Bv)
     lead = _leading(Bv, Bw, B0, slave)
     held = lead.reshape(-1, d) < 0
-    # a normal that is held needs the master to move
-    on_normal = (held & (np.abs(normals) > 1e-6)).any(axis=1, keepdims=True)
+    # a normal that is held needs the master to move; on a plane of symmetry that of facets is only nearly free
+    on_normal = (held & (np.abs(normals) > HELD)).any(axis=1, keepdims=True)
     master_held: BoolArray = np.reshape(np.diff(_cleaned(rows @ B0).indptr), (-1, d)) > 1
     empty: BoolArray = np.reshape(np.diff(G.indptr), (-1, d)) == 0
     wanted = np.asarray(~(held & (empty | (master_held & ~on_normal)))).ravel()
