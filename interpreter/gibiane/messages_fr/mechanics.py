@@ -132,6 +132,8 @@ MECHANICS = {
     "{count} nodes of the smaller surface have no partner and stay free of contact": "{count} noeuds de la plus petite surface n'ont pas de vis-à-vis et restent sans contact",
     "'{word}' goes with coincident nodes only: between different meshes its conditions outnumber the motions of the surfaces, which lock": "'{word}' demande des noeuds coïncidents : entre des maillages différents ses conditions sont plus nombreuses que les mouvements des surfaces, qui se bloquent",
     "'MORT' holds the mean gap about each node, and is exact for a uniform pressure": "'MORT' tient le jeu moyen autour de chaque noeud, et est exact pour une pression uniforme",
+    "nodes of the slave surface are held, and the master is too coarse to follow them all: {count} would be left without contact, the first at ({where})": "des noeuds de la surface esclave sont tenus, et le maître est trop grossier pour tous les suivre : {count} resteraient sans contact, le premier en ({where})",
+    "take the held surface as the master": "prendre la surface tenue pour maître",
     "{count} contact nodes slip by more than half a facet, most by {slip} at ({where})": "{count} noeuds de contact glissent de plus d'une demi-facette, au plus de {slip} en ({where})",
     "nodes keep the facets that they face at the start: the result holds for small slips": "les noeuds gardent les facettes qui leur font face au départ : le résultat vaut pour de petits glissements",
     "contact tractions in balance need surfaces whose nodes coincide; these have different meshes": "des efforts de contact en équilibre demandent des surfaces dont les noeuds coïncident ; celles-ci ont des maillages différents",

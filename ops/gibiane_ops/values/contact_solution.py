@@ -120,6 +120,7 @@ def solve_contact(
             condensed,
         )
         interface = condensation.interface(F, reduction.offset, system.stop_values(field), pairs.gap)
+    _refuse_held(ctx, pairs, condensation.active, reduction.fixed, len(system.nodes))
     tell_notes(ctx, condensation.factor)
     law = system.friction()
     origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs, law, wishes.history)
@@ -145,6 +146,25 @@ def _overlapping(system: System, pairs: ContactPairs) -> NDArray[np.bool_]:
     given = pairs.gap != whole
     given[pairs.penetrating] = True
     return np.asarray(given & (pairs.gap < 0))
+
+
+def _refuse_held(ctx: Context, pairs: ContactPairs, active: NDArray[np.bool_], fixed: IntArray, n_nodes: int) -> None:
+    """Fail when conditions were left out: slave nodes are held, and too few master nodes can move for them."""
+    d = active.shape[1]
+    movable = np.ones((n_nodes, d), dtype=bool)
+    movable.reshape(-1)[fixed] = False
+    moves = np.abs(pairs.matrix(n_nodes)) @ movable.astype(float) > 0
+    lost = ~pairs.plain & ~active[: len(pairs.pairs), 0] & moves.all(axis=1)
+    if lost.any():
+        ctx.fail(
+            "G407",
+            "nodes of the slave surface are held, and the master is too coarse to follow them all: {count} would be "
+            "left without contact, the first at ({where})",
+            at="k",
+            count=int(lost.sum()),
+            where=" ".join(f"{x:g}" for x in pairs.points[np.flatnonzero(lost)[0]]),
+            hint="take the held surface as the master",
+        )
 
 
 def _warn_far(ctx: Context, system: System, pairs: ContactPairs, state: ContactState) -> None:

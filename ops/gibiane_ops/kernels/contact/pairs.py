@@ -168,13 +168,13 @@ class ContactPairs:
         new = np.full(len(self.pairs), -1, np.int64)
         new[kept] = np.arange(len(kept))
         used = new[self.row] >= 0
-        marked = [place[place >= 0] for place in (new[self.not_facing], new[self.penetrating])]
-        given = [values[kept] if len(values) else values for values in (self.area, self.size)]
+        away, deep = (place[place >= 0] for place in (new[self.not_facing], new[self.penetrating]))
+        area, size = (values[kept] if len(values) else values for values in (self.area, self.size))
         return ContactPairs(
             self.pairs[kept], self.normals[kept], self.gap[kept], self.points[kept], self.zone[kept],
-            self.unpaired_slave, self.unpaired_master, *marked,
+            self.unpaired_slave, self.unpaired_master, away, deep,
             new[self.row[used]], self.node[used], self.coefficient[used],
-            new[self.middles[new[self.middles[:, 0]] >= 0]], *given,
+            new[self.middles[new[self.middles[:, 0]] >= 0]], area, size,
         )  # fmt: skip
 
     def on_changed_basis(self) -> ContactPairs:
