@@ -67,7 +67,12 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "FORME": ("gibiane_ops.mesh.configurations",),
     "PROJETER": ("gibiane_ops.mesh.projection",),
     # lists
-    "SORTIR": ("gibiane_ops.lists.files", "gibiane_ops.output.files", "gibiane_ops.exchange.writing"),
+    "SORTIR": (
+        "gibiane_ops.lists.files",
+        "gibiane_ops.output.files",
+        "gibiane_ops.output.report",
+        "gibiane_ops.exchange.writing",
+    ),
     "LIRE": ("gibiane_ops.lists.files", "gibiane_ops.exchange.reading"),
     "ASSISTANT": ("gibiane_ops.assistants.operator",),
     "SAUVER": ("gibiane_ops.exchange.sessions",),

@@ -300,7 +300,9 @@ SORT = operator(
     summary="write results to a file",
     notice="`SORT 'CHAI' x...` writes one line to the file that OPTI 'SORT' names: words as they are, "
     "integers in 5 columns and 3 blanks, reals as 1PG12.5 between one and three blanks. 'VTK' "
-    "writes meshes and fields for a viewer.",
+    "writes meshes and fields for a viewer; 'HTML' T one file that a browser reads without a network: T . 'TITRE', "
+    "and pages T . 1, T . 2 ..., TABLEs with a 'TITRE' and parts 1, 2 ...: a MOT, an EVOLUTIO, a MAILLAGE, or a TABLE "
+    "with 'COURBES', 'LIGNES', 'COLONNES', 'MAILLAGE', 'CHAMP', 'TEXTE' or 'FICHIER' (docs/report.md).",
     example="OPTI 'SORT' 'resultats.txt' ; SORT 'CHAI' 'n' 4 0.5 ;",
     see=["OPTION"],
 )

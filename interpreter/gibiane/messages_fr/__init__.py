@@ -9,6 +9,16 @@ from gibiane.messages_fr.lists import LISTS
 from gibiane.messages_fr.mechanics import MECHANICS
 from gibiane.messages_fr.mesh import MESH
 from gibiane.messages_fr.numbers import NUMBERS
+from gibiane.messages_fr.pictures import PICTURES
 from gibiane.messages_fr.solutions import SOLUTIONS
 
-FRENCH: dict[str, str] = {**LANGUAGE, **LISTS, **MESH, **MECHANICS, **NUMBERS, **SOLUTIONS, **GEOMETRY}
+FRENCH: dict[str, str] = {
+    **LANGUAGE,
+    **LISTS,
+    **MESH,
+    **MECHANICS,
+    **NUMBERS,
+    **PICTURES,
+    **SOLUTIONS,
+    **GEOMETRY,
+}

@@ -208,9 +208,9 @@ def _rim(facets: Sequence[IntArray]) -> IntArray:
     return np.asarray(unique[count == 1], np.int64)
 
 
-def arrow_layers(points: FloatArray, vectors: Vecteur, size: float) -> list[Layer]:
+def arrow_layers(points: FloatArray, vectors: Vecteur, size: float) -> list[Arrows]:
     """Return the arrows of a VECTEUR; `size` is the diagonal of the scene."""
-    layers: list[Layer] = []
+    layers: list[Arrows] = []
     dim = points.shape[1]
     for arrow in vectors.arrows:
         nodes = arrow.field.nodes
