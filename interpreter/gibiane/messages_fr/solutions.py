@@ -44,4 +44,5 @@ SOLUTIONS: dict[str, str] = {
     "workers die again and again, {n} cases are not done: {reason}": "les assistants meurent les uns après les autres, {n} cas ne sont pas faits : {reason}",
     "fewer workers need less memory at a time; with 'REPR' what is finished is kept": "moins d'assistants demandent moins de mémoire à la fois ; avec 'REPR' ce qui est fini est gardé",
     "no cluster answers at {address}: {reason}": "aucune grappe ne répond à {address} : {reason}",
+    "OPTI 'RESO' 'ITER' needs much less memory": "OPTI 'RESO' 'ITER' demande bien moins de mémoire",
 }
