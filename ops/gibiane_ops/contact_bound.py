@@ -9,19 +9,21 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
+from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.contact_bound import ContactTractions, contact_tractions
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
 from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, partners, shared_out
-from gibiane_ops.values.equilibrated import ROUND_OFF, equilibrated, guarantee_of, parts_of
-from gibiane_ops.values.estimates import NORM, TABL, Guarantee, stresses_of
+from gibiane_ops.values.equilibrated import check_balance, equilibrated, guarantee_of, parts_of
+from gibiane_ops.values.estimates import NORM, TABL, stresses_of
 from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior, held_at, held_directions
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import solid_zones
 from gibiane_ops.values.modele import Modele
-from gibiane_ops.values.nodes import node_store
+from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, exact_pieces, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
@@ -32,7 +34,7 @@ FLAT = 1e-6
 @ERRE.form(
     Key("CONTACT", "with the contact part", required=True),
     Key("RDC", "constitutive relation error", required=True),
-    Arg("model", MMODEL, "solids (TET4, or TRI3 in a plane)"),
+    Arg("model", MMODEL, "solids of linear elements; other elements than simplices are cut"),
     Arg("sig", MCHAML, "stress"),
     Arg("mat", MCHAML, "material"),
     Arg("mc", MMODEL, "contact model", optional=True),
@@ -67,50 +69,53 @@ def _bound_with_contact(
     given = contact_operands(ctx, model, mc, u, rea, [("sig", sig), ("mat", mat), ("matc", matc)])
     stress, material, _ = stresses_of(ctx, *given.solid)
     zones = solid_zones(ctx, given.model)
-    sides = exterior(ctx, zones, cl, pres, fsur)
+    outside = exterior(ctx, zones, cl, pres, fsur)
+    states = solved_contacts(ctx, given.contact, given.law, given.u, given.reaction)
+    pieces = pieces_of(ctx, zones, np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)]))
+    check_balance(ctx, pieces, stress, outside, volu, cl, [each for s in states for each in _forces(s)])
+    sides = [cut_sides(ctx, pieces, outside)]
     blocks = [(z.shape, z.cells) for z in zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
     doubts: list[str] = []
-    for state in solved_contacts(ctx, given.contact, given.law, given.u, given.reaction):
-        found = _tractions(ctx, state, given.law, sides, cl)
+    for state in states:
+        found, squares = _tractions(ctx, state, given.law, pieces, sides, cl)
         doubts += _doubts(state, found)
         # The identity of Prager and Synge holds with twice the contact part.
-        totals = shared_out(ctx, state, blocks, [2 * found.facet], totals)
-        facets += facet_zones(ctx, state, [2 * found.facet], zones[0].mode)
-    solid = equilibrated(ctx, zones, stress, material, sides, volu, sweeps)
-    guarantee = guarantee_of(ctx, solid)
-    if doubts:
-        reason = "not guaranteed (" + "; ".join(dict.fromkeys(doubts)) + ")"
-        ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason)
-        guarantee = Guarantee(False, reason)
+        totals = shared_out(ctx, state, blocks, squares, totals)
+        facets += facet_zones(ctx, state, squares, zones[0].mode)
+    solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl)
+    cutting = exact_pieces(ctx, pieces, outside)
+    doubts += [cutting] if cutting else []
+    guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)))
     more = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
-    return contact_results(ctx, parts_of(zones, solid), totals, norm, tabl, guarantee, facets, more)
+    return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, more)
+
+
+def _forces(state: SolvedContact) -> list[tuple[IntArray, FloatArray]]:
+    """Return the contact forces at the nodes of both surfaces, in global axes."""
+    slave, master = state.pairs.pairs.T
+    force = np.einsum("nij,ni->nj", state.frames, state.force)
+    both = master >= 0
+    return [(slave, force), (master[both], -force[both])]
 
 
 def _tractions(
-    ctx: Context, state: SolvedContact, law: MChaml, sides: list[Side], supports: Rigidite | None
-) -> ContactTractions:
-    """Find the contact tractions of a zone and put them on both of its surfaces."""
+    ctx: Context, state: SolvedContact, law: MChaml, pieces: Pieces, sides: list[Side], supports: Rigidite | None
+) -> tuple[ContactTractions, list[FloatArray]]:
+    """Find the contact tractions of a zone and put them on both of its surfaces; twice the errors of its facets."""
     store, dim = node_store(ctx), state.frames.shape[1]
     name = "TRI3" if dim == 3 else "SEG2"
-    block = state.zone.slave.blocks[0]
-    if any(b.shape != name for b in state.zone.slave.blocks):
+    wrong = next((b.shape for b in state.zone.slave.blocks if shape(b.shape).degree > 1), None)
+    if wrong is not None:
         ctx.fail(
             251,
-            "contact tractions in balance are built on {wanted} only",
+            "contact tractions in balance are built on facets of linear elements only, not on {shape}",
             at="mc",
-            wanted=name,
-            hint="the contact surfaces of solids in tetrahedra are triangles",
+            shape=wrong,
         )
-    if not state.pairs.plain.all():
-        ctx.fail(
-            251,
-            "contact tractions in balance need surfaces whose nodes coincide; these have different meshes",
-            at="mc",
-            hint="mesh the contact surface once and copy it for the other solid; ERREUR 'CONTACT' without 'RDC' "
-            "estimates the error on any meshes",
-        )
+    cuts = [(b.cells, *pieces.facets(b.cells)) for b in state.zone.slave.blocks]
+    cells = np.concatenate([np.take_along_axis(c[owner], places, axis=1) for c, places, owner in cuts])
     slave, master = state.pairs.pairs.T
     known = held_directions(store, supports, DISPLACEMENT[:dim], dim)
     # A support holds an axis of both nodes of a pair; an obstacle (-1) needs no balance of its own.
@@ -121,7 +126,7 @@ def _tractions(
     with worded(ctx, at="mc"):
         found = contact_tractions(
             store.coords[:, :dim],
-            block.cells,
+            cells,
             slave,
             state.frames,
             state.force,
@@ -131,8 +136,8 @@ def _tractions(
             np.zeros(len(slave)) if threshold is None else threshold,
             sure,
         )
-    lost = len(block.cells) - add_tractions(sides, name, block.cells, found.traction)
-    facing = partners(ctx, state)[block.cells]
+    lost = len(cells) - add_tractions(sides, name, cells, found.traction)
+    facing = partners(ctx, state)[cells]
     both = (facing >= 0).all(axis=1)
     lost += int(both.sum()) - add_tractions(sides, name, facing[both], -found.traction[both])
     if lost:
@@ -143,7 +148,8 @@ def _tractions(
             count=lost,
             hint="mesh the contact surface once, copy it for the other solid, and cut both alike",
         )
-    return found
+    parts = np.split(2 * found.facet, np.cumsum([len(owner) for _, _, owner in cuts])[:-1])
+    return found, [np.bincount(o, p, len(c)).astype(np.float64) for (c, _, o), p in zip(cuts, parts, strict=True)]
 
 
 def _doubts(state: SolvedContact, found: ContactTractions) -> list[str]:

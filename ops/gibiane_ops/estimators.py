@@ -15,7 +15,7 @@ from gibiane_ops.kernels.estimate.zz import SolidError, stress_energy
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.values.champs import MChaml
-from gibiane_ops.values.equilibrated import equilibrated, guarantee_of, parts_of
+from gibiane_ops.values.equilibrated import check_balance, equilibrated, guarantee_of, parts_of
 from gibiane_ops.values.estimates import KIND, NORM, REFE, TABL, Guarantee, Parts, results, stresses_of
 from gibiane_ops.values.exterior import LOADS, exterior
 from gibiane_ops.values.failures import worded
@@ -24,6 +24,7 @@ from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_compliance, on_zone, solid_zones
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import node_store
+from gibiane_ops.values.pieces import cut_sides, exact_pieces, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
@@ -32,7 +33,7 @@ RESIDUALS = Guarantee(False, "explicit residuals follow the error up to a factor
 
 @ERRE.form(
     Key("RDC", "constitutive relation error", required=True),
-    Arg("model", MMODEL, "model (TET4, or TRI3 in a plane)"),
+    Arg("model", MMODEL, "model of linear elements in space or in a plane; other elements than simplices are cut"),
     Arg("sig", MCHAML, "stress"),
     Arg("mat", MCHAML, "material"),
     *LOADS,
@@ -62,9 +63,12 @@ def _constitutive_relation(
     stress, material, _ = stresses_of(ctx, sig, mat, None)
     zones = solid_zones(ctx, model)
     sides = exterior(ctx, zones, cl, pres, fsur)
-    found = equilibrated(ctx, zones, stress, material, sides, volu, sweeps)
+    pieces = pieces_of(ctx, zones)
+    check_balance(ctx, pieces, stress, sides, volu, cl)
+    found = equilibrated(ctx, pieces, stress, material, cut_sides(ctx, pieces, sides), volu, sweeps, cl)
+    guarantee = guarantee_of(ctx, found, exact_pieces(ctx, pieces, sides))
     more = {"EQUILIBRE": found.residual, "HISTOIRE": ListReel(found.history)}
-    return results(ctx, parts_of(zones, found), kind, norm, tabl, guarantee_of(ctx, found), refe, more)
+    return results(ctx, parts_of(pieces, found), kind, norm, tabl, guarantee, refe, more)
 
 
 @ERRE.form(

@@ -2,32 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NoReturn
+
 import numpy as np
 
 from gibiane.registry import Context
+from gibiane_ops.kernels import assembly
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotEquilibrated
-from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress
-from gibiane_ops.kernels.estimate.simplices import simplices
+from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
+from gibiane_ops.kernels.estimate.macro import STATIC
+from gibiane_ops.kernels.estimate.pieces import Aim, aim_of, balanced_stress
+from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
 from gibiane_ops.kernels.estimate.zz import SolidError
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.kernels.topology import group_by_nodes
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.estimates import Guarantee, Parts
-from gibiane_ops.values.exterior import Side
+from gibiane_ops.values.exterior import Side, held_at, held_directions
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_law, on_zone
-from gibiane_ops.values.modele import ModelZone
+from gibiane_ops.values.modele import DISPLACEMENTS
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+from gibiane_ops.values.pieces import ROUND_OFF, Pieces
+from gibiane_ops.values.rigidite import Rigidite
 
 GUARANTEED = Guarantee(True, "a stress in exact equilibrium with the loads: the error is not above this value")
-ROUND_OFF = 1e-9
+UNBALANCED = 1e-7
+"""Largest force left at a node, over the largest nodal force of an element."""
 
 
-def guarantee_of(ctx: Context, found: Admissible) -> Guarantee:
-    """Say whether the equilibrium was found to hold to round-off; if not, warn."""
+def guarantee_of(ctx: Context, found: Admissible, doubt: str = "") -> Guarantee:
+    """Say whether the equilibrium was found to hold to round-off, and nothing else is in `doubt`; if not, warn."""
+    if doubt:
+        reason = f"not guaranteed ({doubt})"
+        ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason)
+        return Guarantee(False, reason)
     if found.residual <= ROUND_OFF:
         return GUARANTEED
     ctx.warn(
@@ -39,76 +52,140 @@ def guarantee_of(ctx: Context, found: Admissible) -> Guarantee:
     return Guarantee(False, f"the equilibrium is violated by {found.residual:.1e} of the tractions")
 
 
-def parts_of(zones: list[ModelZone], found: Admissible) -> Parts:
-    """Return the errors zone by zone."""
-    cuts = np.cumsum([len(z.cells) for z in zones])[:-1]
+def parts_of(pieces: Pieces, found: Admissible) -> Parts:
+    """Return the errors zone by zone, those of simplices summed over the element that they are pieces of."""
+    cuts = np.cumsum([len(owner) for owner in pieces.owner])[:-1]
     columns = [np.split(each, cuts) for each in (found.error, found.energy, found.sum_energy)]
-    return Parts(zones, [SolidError(*each) for each in zip(*columns, strict=True)])
+    errors = [
+        SolidError(*(np.bincount(owner, part, len(zone.cells)).astype(np.float64) for part in each))
+        for zone, owner, *each in zip(pieces.zones, pieces.owner, *columns, strict=True)
+    ]
+    return Parts(pieces.zones, errors)
 
 
 def equilibrated(
     ctx: Context,
-    zones: list[ModelZone],
+    pieces: Pieces,
     stress: MChaml,
     material: MChaml,
-    sides: list[Side],
+    side: Side,
     volu: Point | None,
     sweeps: int | None,
+    supports: Rigidite | None,
 ) -> Admissible:
     """Build the stress in equilibrium over all the zones together: they exchange tractions where they share nodes."""
-    dim, of = zones[0].dim, shape(zones[0].shape)
-    wanted = "TET4" if dim == 3 else "TRI3"
-    wrong = next((z for z in zones if z.shape != wanted or z.axisymmetric), None)
-    if wrong is not None:
-        ctx.fail(
-            251,
-            "an equilibrated stress is built on {wanted} only, not on {shape} in mode {mode}",
-            at="model",
-            wanted=wanted,
-            shape=wrong.shape,
-            mode=wrong.mode,
-            hint="CHAN '{wanted}' cuts a mesh; solve on it before the estimate",
-        )
+    zones = pieces.zones
+    dim = zones[0].dim
     if sweeps is not None and sweeps < 0:
         ctx.fail(41, "the number of sweeps {count} is negative", at="sweeps", count=sweeps)
     body = np.zeros(dim) if volu is None else volu.coords[:dim]
     count = SWEEPS if sweeps is None else sweeps
-    nodes, flat = np.unique(np.concatenate([z.cells for z in zones]), return_inverse=True)
-    cells = flat.reshape(-1, dim + 1)
-    points = node_store(ctx).coords[nodes][:, :dim]
-    given = [moved(of, on_zone(ctx, stress, z, "sig").values, stress.support, "STRESSES") for z in zones]
-    sigma = np.concatenate([each[:, 0] for each in given])
-    law = np.concatenate(
-        [np.broadcast_to(elastic_law(ctx, material, z, "mat"), (len(z.cells), *2 * sigma.shape[1:])) for z in zones]
+    points = node_store(ctx).coords[pieces.nodes][:, :dim]
+    laws, nodal, means = [], [], []
+    for zone, owner, corners in zip(zones, pieces.owner, pieces.corners, strict=True):
+        of = shape(zone.shape)
+        values = on_zone(ctx, stress, zone, "sig").values
+        law = elastic_law(ctx, material, zone, "mat")
+        laws.append(np.broadcast_to(law, (len(zone.cells), *2 * values.shape[2:]))[owner])
+        nodal.append(moved(of, values, stress.support, "NOEUD")[owner])
+        means.append(np.take_along_axis(nodal[-1], corners[:, :, None], axis=1).mean(axis=1))
+    cells = np.concatenate(
+        [
+            np.take_along_axis(c[owner], corners, axis=1)
+            for c, owner, corners in zip(pieces.cells, pieces.owner, pieces.corners, strict=True)
+        ]
     )
+    law, sigma = np.concatenate(laws), np.concatenate(means)
     with worded(ctx, at="model"):
         mesh = simplices(points, cells)
-        traction, free = _on_boundary(sides, nodes, mesh.nodes[mesh.boundary])
+        traction, free = _on_boundary(side, pieces.nodes, mesh.nodes[mesh.boundary])
         loads = Exterior(traction, free, np.tile(body, (len(cells), 1)))
+        aim = None
+        if not pieces.whole:
+            aim = _aim(pieces, mesh, cells, nodal, plane_compliance(law, dim))
+            known, held = held_directions(node_store(ctx), supports, DISPLACEMENTS[zones[0].family], dim)
+            with worded(ctx, at="sig"):
+                sigma = balanced_stress(mesh, sigma, law, loads, held_at(known, held, pieces.nodes))
         try:
-            return admissible_stress(points, cells, sigma, law, loads, sweeps=count, mesh=mesh)
+            return admissible_stress(points, cells, sigma, law, loads, sweeps=count, mesh=mesh, aim=aim)
         except NotEquilibrated as failure:
-            node = int(nodes[failure.nodes[0]])
-            where = " ".join(f"{x:g}" for x in node_store(ctx).coords[node][:dim])
-            left = failure.forces[0]
-            force = " ".join(f"{x:.4g}" for x in np.where(np.abs(left) > 1e-9 * np.abs(left).max(), left, 0.0))
-            ctx.fail(
-                21,
-                "the stress does not balance the loads given: {count} nodes keep a force, first node {node} at "
-                "({where}), force ({force})",
-                at="sig",
-                count=len(failure.nodes),
-                node=node + 1,
-                where=where,
-                force=force,
-                hint="give every load by 'PRES', 'FSUR' or 'VOLU' and the supports; forces and supports at single "
-                "points or lines, and contact, are not balanced by tractions",
-            )
+            _unbalanced(ctx, pieces.nodes[failure.nodes], failure.forces)
 
 
-def _on_boundary(sides: list[Side], nodes: IntArray, boundary: IntArray) -> tuple[FloatArray, FloatArray]:
+def _unbalanced(ctx: Context, nodes: IntArray, forces: FloatArray) -> NoReturn:
+    """Fail because forces are left at nodes."""
+    where = " ".join(f"{x:g}" for x in node_store(ctx).coords[nodes[0]][: forces.shape[1]])
+    left = forces[0]
+    force = " ".join(f"{x:.4g}" for x in np.where(np.abs(left) > 1e-9 * np.abs(left).max(), left, 0.0))
+    ctx.fail(
+        21,
+        "the stress does not balance the loads given: {count} nodes keep a force, first node {node} at "
+        "({where}), force ({force})",
+        at="sig",
+        count=len(nodes),
+        node=int(nodes[0]) + 1,
+        where=where,
+        force=force,
+        hint="give every load by 'PRES', 'FSUR' or 'VOLU' and the supports; forces and supports at single "
+        "points or lines, and contact, are not balanced by tractions",
+    )
+
+
+def check_balance(
+    ctx: Context,
+    pieces: Pieces,
+    stress: MChaml,
+    sides: list[Side],
+    volu: Point | None,
+    supports: Rigidite | None,
+    contact: Sequence[tuple[IntArray, FloatArray]] = (),
+) -> None:
+    """Fail unless the stress of elements that are cut balances loads and contact forces at the nodes not held.
+
+    Pieces of elements would balance whatever they are given: a load forgotten must be seen before.
+    """
+    if pieces.whole:
+        return
+    store, zones = node_store(ctx), pieces.zones
+    dim, n = zones[0].dim, len(pieces.nodes)
+    points = store.coords[pieces.nodes][:, :dim]
+    force, scale = np.zeros((n, dim)), 0.0
+    for zone, cells in zip(zones, pieces.cells, strict=True):
+        of = shape(zone.shape)
+        values = moved(of, on_zone(ctx, stress, zone, "sig").values, stress.support, "STRESSES")
+        inner = assembly.internal_forces(of, points[cells], values)
+        scale = max(scale, float(np.abs(inner).max(initial=0.0)))
+        np.add.at(force, cells, -inner)
+        if volu is not None:
+            np.add.at(force, cells, assembly.distributed_load(of, points[cells], volu.coords[:dim]))
+    for side in sides:
+        places = np.searchsorted(pieces.nodes, side.facets.nodes)
+        np.add.at(force, places, np.matmul(assembly.face_mass(shape(side.facets.name), points[places]), side.traction))
+    for nodes, values in contact:
+        np.add.at(force, np.searchsorted(pieces.nodes, nodes), values)
+    known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
+    force -= np.einsum("nij,nj->ni", held_at(known, held, pieces.nodes), force)
+    size = np.linalg.norm(force, axis=1)
+    wrong = np.flatnonzero(size > UNBALANCED * scale)
+    if len(wrong):
+        worst = wrong[np.argsort(-size[wrong], kind="stable")]
+        _unbalanced(ctx, pieces.nodes[worst], force[worst])
+
+
+def _aim(pieces: Pieces, mesh: Simplices, cells: IntArray, nodal: list[FloatArray], compliance: FloatArray) -> Aim:
+    """Describe the stress of the elements on their pieces, the corners in the order of the mesh of simplices."""
+    order, static = np.argsort(cells, axis=1), np.array(STATIC[mesh.dim])
+    found, start = [], 0
+    for zone, corners, values in zip(pieces.zones, pieces.corners, nodal, strict=True):
+        some = slice(start, start + len(corners))
+        turned = np.take_along_axis(corners, order[some], axis=1)
+        found.append(aim_of(shape(zone.shape), mesh.map[some], values[:, :, static], turned, compliance[some]))
+        start += len(corners)
+    return Aim(*(np.concatenate(each) for each in zip(*[(a.mean, a.pull, a.constant) for a in found], strict=True)))
+
+
+def _on_boundary(side: Side, nodes: IntArray, boundary: IntArray) -> tuple[FloatArray, FloatArray]:
     """Put what is imposed on the sides in the order of the boundary of a mesh of simplices."""
-    (side,) = sides
     given = np.searchsorted(nodes, side.facets.nodes)
     order = np.argsort(given, axis=1)
     group, _ = group_by_nodes(np.vstack([boundary, given]))

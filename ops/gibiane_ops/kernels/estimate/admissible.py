@@ -8,6 +8,7 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.macro import STATIC, contraction, macro_element, turned
+from gibiane_ops.kernels.estimate.pieces import Aim
 from gibiane_ops.kernels.estimate.simplices import Simplices, others, simplices
 from gibiane_ops.kernels.estimate.stars import Improver, jumps
 from gibiane_ops.kernels.estimate.tractions import Exterior, balanced_tractions
@@ -83,6 +84,7 @@ def admissible_stress(
     *,
     sweeps: int = SWEEPS,
     mesh: Simplices | None = None,
+    aim: Aim | None = None,
 ) -> Admissible:
     """Build a stress in equilibrium with the loads, near a finite-element stress, and measure their distance.
 
@@ -101,6 +103,9 @@ def admissible_stress(
         Improvements star by star.
     mesh : Simplices, optional
         That of the same points and cells, when it is at hand.
+    aim : Aim, optional
+        The finite-element stress to which the distance is taken, when the cells are pieces of its elements; `stress`
+        then only has to balance the loads at the nodes.
 
     Returns
     -------
@@ -132,18 +137,29 @@ def admissible_stress(
     sigma = stress[:, STATIC[dim]]
     compliance = np.broadcast_to(plane_compliance(law, dim), (len(cells), sigma.shape[1], sigma.shape[1]))
     tau = balanced_tractions(mesh, sigma, exterior)
-    history = [float(np.sqrt(errors(mesh, tau, sigma, compliance).sum()))]
+    pull: FloatArray | None = None
+    constant: FloatArray | float = 0.0
+    if aim is not None:
+        sigma, pull, constant = aim.mean, aim.pull, aim.constant
+
+    def distance(sign: float) -> FloatArray:
+        found = errors(mesh, tau, sign * sigma, compliance)
+        if pull is not None:
+            found -= 2 * sign * (pull * jumps(mesh, tau, sign * sigma).reshape(len(pull), -1)).sum(axis=1)
+        return np.maximum(found + constant, 0.0)
+
+    history = [float(np.sqrt(distance(1.0).sum()))]
     if sweeps:
         free = np.broadcast_to(np.eye(dim), (len(mesh.nodes), dim, dim)).copy()
         free[mesh.boundary] = exterior.free
-        improver = Improver(mesh, sigma, compliance, free)
+        improver = Improver(mesh, sigma, compliance, free, pull)
         for _ in range(sweeps):
             improver.sweep(tau)
-            history.append(float(np.sqrt(errors(mesh, tau, sigma, compliance).sum())))
-    error = errors(mesh, tau, sigma, compliance)
-    energy = mesh.volume * np.einsum("ms,mst,mt->m", sigma, compliance, sigma)
-    sums = errors(mesh, tau, -sigma, compliance)
-    return Admissible(mesh, tau, error, energy, sums, history, equilibrium_residual(mesh, tau, exterior))
+            history.append(float(np.sqrt(distance(1.0).sum())))
+    energy = mesh.volume * np.einsum("ms,mst,mt->m", sigma, compliance, sigma) + constant
+    return Admissible(
+        mesh, tau, distance(1.0), energy, distance(-1.0), history, equilibrium_residual(mesh, tau, exterior)
+    )
 
 
 def stress_at_corners(mesh: Simplices, tractions: FloatArray, cells: IntArray | slice = slice(None)) -> FloatArray:

@@ -111,11 +111,21 @@ class Improver:
     compliance : (m, n_s, n_s) float64, length^2 / force
     free : (n_sides, d, d) float64
         Projector on the directions in which the traction of each side may change.
+    pull : (m, n_t) float64, optional
+        What a stress that is not uniform in the cells adds, see `pieces.Aim`.
     """
 
-    def __init__(self, mesh: Simplices, stress: FloatArray, compliance: FloatArray, free: FloatArray) -> None:
+    def __init__(
+        self,
+        mesh: Simplices,
+        stress: FloatArray,
+        compliance: FloatArray,
+        free: FloatArray,
+        pull: FloatArray | None = None,
+    ) -> None:
         dim = mesh.dim
         self.mesh, self.stress, self.compliance, self.free = mesh, stress, compliance, free
+        self.pull = pull
         movable = np.flatnonzero(free.any(axis=(1, 2)))
         corner = others(dim)[mesh.local[movable, 0]]
         star = mesh.star[mesh.cell[movable, 0][:, None], corner]
@@ -200,6 +210,8 @@ class Improver:
         full *= sign[:, :, None, None, None] * sign[:, None, None, :, None]
         H = full[each[..., None], sides[:, :, None], :, sides[:, None, :], :]
         rows = np.einsum("kaibj,kbj->kai", full, jump.reshape(k, dim + 1, block), optimize=True)
+        if self.pull is not None:
+            rows -= sign[..., None] * self.pull[cells].reshape(k, dim + 1, block)
         descent = -rows[each, sides]
         B = balance_rows(mesh, cells).reshape(k, -1, dim + 1, block) * sign[:, None, :, None]
         B = B[each, :, sides].swapaxes(2, 3)
