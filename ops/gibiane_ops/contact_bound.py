@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.contact_bound import ContactTractions, contact_tractions
+from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
 from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, partners, shared_out
@@ -27,6 +29,13 @@ from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, exact_pieces
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
+CLOSED = 1e-9
+"""Largest opening of a closed pair, over the largest relative displacement."""
+
+FROZEN = (
+    "the bound holds for the neighbouring problem of Tresca: MODE 'FROTTANT' 'TRESCA' and MATE 'SEUI' with MU times the "
+    "pressure found"
+)
 FLAT = 1e-6
 """Largest angle between the normals of facets and nodes of a contact surface that counts as plane."""
 
@@ -70,7 +79,7 @@ def _bound_with_contact(
     stress, material, _ = stresses_of(ctx, *given.solid)
     zones = solid_zones(ctx, given.model)
     outside = exterior(ctx, zones, cl, pres, fsur)
-    states = solved_contacts(ctx, given.contact, given.law, given.u, given.reaction)
+    states = list(solved_contacts(ctx, given.contact, given.law, given.u, given.reaction))
     pieces = pieces_of(ctx, zones, np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)]))
     check_balance(ctx, pieces, stress, outside, volu, cl, [each for s in states for each in _forces(s)])
     sides = [cut_sides(ctx, pieces, outside)]
@@ -78,16 +87,24 @@ def _bound_with_contact(
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
     doubts: list[str] = []
+    joint, complete = _joint(ctx, states, pieces)
+    curable = complete and all(s.zone.law == "UNILATERAL" for s in states)
+    tensions: list[float] = []
     for state in states:
         found, squares = _tractions(ctx, state, given.law, pieces, sides, cl)
-        doubts += _doubts(state, found)
+        if curable and not found.admissible:
+            tensions.append(found.violation)
+        doubts += _doubts(state, found, curable)
         # The identity of Prager and Synge holds with twice the contact part.
         totals = shared_out(ctx, state, blocks, squares, totals)
         facets += facet_zones(ctx, state, squares, zones[0].mode)
-    solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl)
+    solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl, joint)
+    # Tensions of the tractions that balance each node are no harm when the improved ones push everywhere.
+    if solid.tension > 0 or (tensions and sweeps == 0):
+        doubts.append(_unlawful(max([solid.tension, *tensions])))
     cutting = exact_pieces(ctx, pieces, outside)
     doubts += [cutting] if cutting else []
-    guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)))
+    guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), FROZEN if "Coulomb" in doubts else None)
     more = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
     return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, more)
 
@@ -152,13 +169,50 @@ def _tractions(
     return found, [np.bincount(o, p, len(c)).astype(np.float64) for (c, _, o), p in zip(cuts, parts, strict=True)]
 
 
-def _doubts(state: SolvedContact, found: ContactTractions) -> list[str]:
+def _joint(ctx: Context, states: Sequence[SolvedContact], pieces: Pieces) -> tuple[Joint | None, bool]:
+    """Find the facets that are closed at all their nodes, without a gap in the mesh: their pressures may be improved.
+
+    None where friction ties the bounds of the tractions to the pressures. Also tells whether all the facets that carry
+    tractions are among them.
+    """
+    dim = pieces.zones[0].dim
+    points = node_store(ctx).coords[pieces.nodes][:, :dim]
+    name, facets, carrying = np.arange(len(pieces.nodes)), [np.zeros((0, dim), np.int64)], 0
+    for state in states:
+        if state.zone.law not in ("UNILATERAL", "TRESCA"):
+            continue
+        slave, master = state.pairs.pairs.T
+        there = np.flatnonzero(master >= 0)
+        one, two = (np.searchsorted(pieces.nodes, side[there]) for side in (slave, master))
+        open_by = np.abs(state.relative[there, 0] - state.gap[there])
+        size = float(np.ptp(points, axis=0).max())
+        shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[there, 0] < 0)
+        shut &= np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size
+        name[one[shut]] = two[shut]
+        closed, loaded = np.zeros((2, len(pieces.nodes)), bool)
+        closed[one[shut]] = True
+        size_of = np.linalg.norm(state.force[there], axis=1)
+        loaded[one[size_of > 1e-12 * size_of.max(initial=0.0)]] = True
+        for block in state.zone.slave.blocks:
+            places, owner = pieces.facets(block.cells)
+            cells = np.searchsorted(pieces.nodes, np.take_along_axis(block.cells[owner], places, axis=1))
+            facets.append(name[cells[closed[cells].all(axis=1)]])
+            carrying += int(loaded[cells].all(axis=1).sum())
+    found = np.concatenate(facets)
+    return (Joint(name, found) if len(found) else None), len(found) == carrying > 0
+
+
+def _unlawful(violation: float) -> str:
+    return f"no contact tractions in balance obey the law: it is left by {violation:.2g}"
+
+
+def _doubts(state: SolvedContact, found: ContactTractions, curable: bool) -> list[str]:
     """Say what keeps the contact of a zone from being part of a bound."""
     doubts = []
     if state.zone.law not in ("UNILATERAL", "TRESCA") and (state.mu > 0).any():
         doubts.append("Coulomb" if state.zone.law == "COULOMB" else f"friction law {state.zone.law}")
-    if not found.admissible:
-        doubts.append(f"no contact tractions in balance obey the law: it is left by {found.violation:.2g}")
+    if not found.admissible and not curable:
+        doubts.append(_unlawful(found.violation))
     if found.flatness > FLAT:
         doubts.append("the contact surface is not plane")
     if len(state.pairs.unpaired_slave):

@@ -12,6 +12,7 @@ from gibiane_ops.kernels import assembly
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
+from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.kernels.estimate.macro import STATIC
 from gibiane_ops.kernels.estimate.pieces import Aim, aim_of, balanced_stress
 from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
@@ -35,11 +36,11 @@ UNBALANCED = 1e-7
 """Largest force left at a node, over the largest nodal force of an element."""
 
 
-def guarantee_of(ctx: Context, found: Admissible, doubt: str = "") -> Guarantee:
+def guarantee_of(ctx: Context, found: Admissible, doubt: str = "", hint: str | None = None) -> Guarantee:
     """Say whether the equilibrium was found to hold to round-off, and nothing else is in `doubt`; if not, warn."""
     if doubt:
         reason = f"not guaranteed ({doubt})"
-        ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason)
+        ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason, hint=hint)
         return Guarantee(False, reason)
     if found.residual <= ROUND_OFF:
         return GUARANTEED
@@ -72,6 +73,7 @@ def equilibrated(
     volu: Point | None,
     sweeps: int | None,
     supports: Rigidite | None,
+    joint: Joint | None = None,
 ) -> Admissible:
     """Build the stress in equilibrium over all the zones together: they exchange tractions where they share nodes."""
     zones = pieces.zones
@@ -107,7 +109,7 @@ def equilibrated(
             with worded(ctx, at="sig"):
                 sigma = balanced_stress(mesh, sigma, law, loads, held_at(known, held, pieces.nodes))
         try:
-            return admissible_stress(points, cells, sigma, law, loads, sweeps=count, mesh=mesh, aim=aim)
+            return admissible_stress(points, cells, sigma, law, loads, sweeps=count, mesh=mesh, aim=aim, joint=joint)
         except NotEquilibrated as failure:
             _unbalanced(ctx, pieces.nodes[failure.nodes], failure.forces)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.estimate.joints import Joined, Joint
 from gibiane_ops.kernels.estimate.macro import STATIC, contraction, macro_element, turned
 from gibiane_ops.kernels.estimate.pieces import Aim
 from gibiane_ops.kernels.estimate.simplices import Simplices, others, simplices
@@ -17,6 +18,9 @@ SWEEPS = 2
 """Sweeps over the stars: after two the estimate is 10 to 25 % above the error, singular edges included."""
 
 CHUNK = 4096
+
+CLEANINGS = 20
+"""Largest number of visits to the contact facets that pull."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,8 @@ class Admissible:
         Estimate after the balance of tractions and after each sweep.
     residual : float
         Largest violation of equilibrium found in the stress, relative, see `equilibrium_residual`.
+    tension : float
+        Largest tension on the contact facets of a joint, over the largest traction there; not positive when all push.
     """
 
     mesh: Simplices
@@ -47,6 +53,7 @@ class Admissible:
     sum_energy: FloatArray
     history: list[float]
     residual: float
+    tension: float = 0.0
 
     @property
     def total(self) -> float:
@@ -85,6 +92,7 @@ def admissible_stress(
     sweeps: int = SWEEPS,
     mesh: Simplices | None = None,
     aim: Aim | None = None,
+    joint: Joint | None = None,
 ) -> Admissible:
     """Build a stress in equilibrium with the loads, near a finite-element stress, and measure their distance.
 
@@ -106,6 +114,8 @@ def admissible_stress(
     aim : Aim, optional
         The finite-element stress to which the distance is taken, when the cells are pieces of its elements; `stress`
         then only has to balance the loads at the nodes.
+    joint : Joint, optional
+        Contact facets whose pressures, given with the loads, may be improved too.
 
     Returns
     -------
@@ -148,18 +158,56 @@ def admissible_stress(
             found -= 2 * sign * (pull * jumps(mesh, tau, sign * sigma).reshape(len(pull), -1)).sum(axis=1)
         return np.maximum(found + constant, 0.0)
 
-    history = [float(np.sqrt(distance(1.0).sum()))]
+    history, tension = [float(np.sqrt(distance(1.0).sum()))], 0.0
     if sweeps:
         free = np.broadcast_to(np.eye(dim), (len(mesh.nodes), dim, dim)).copy()
         free[mesh.boundary] = exterior.free
-        improver = Improver(mesh, sigma, compliance, free, pull)
-        for _ in range(sweeps):
-            improver.sweep(tau)
-            history.append(float(np.sqrt(distance(1.0).sum())))
+        joined = Joined(mesh, joint) if joint is not None and len(joint.closed) else None
+        if joined is None:
+            improver = Improver(mesh, sigma, compliance, free, pull)
+            for _ in range(sweeps):
+                improver.sweep(tau)
+                history.append(float(np.sqrt(distance(1.0).sum())))
+        else:
+            turned_pull = None if pull is None else joined.turned(pull)
+            together = joined.taken(tau)
+            first, pressed = together.copy(), (joined.normal, joined.margin(together))
+            improver = Improver(joined.mesh, sigma, compliance, joined.free(free), turned_pull, pressed)
+            for _ in range(sweeps):
+                improver.sweep(together)
+                _compressed(joined, improver, together)
+                tau = joined.given_back(joined.inside(first, together))
+                history.append(float(np.sqrt(distance(1.0).sum())))
+            exterior = _with_contact(joined, exterior, tau)
+            pulls = joined.tension(joined.taken(tau))
+            tension = float(pulls.max() / np.abs(pulls).max())
     energy = mesh.volume * np.einsum("ms,mst,mt->m", sigma, compliance, sigma) + constant
-    return Admissible(
-        mesh, tau, distance(1.0), energy, distance(-1.0), history, equilibrium_residual(mesh, tau, exterior)
-    )
+    residual = equilibrium_residual(mesh, tau, exterior)
+    return Admissible(mesh, tau, distance(1.0), energy, distance(-1.0), history, residual, tension)
+
+
+def _compressed(joined: Joined, improver: Improver, tau: FloatArray) -> None:
+    """Improve the stars of contact facets until none pulls, some times at most."""
+    for _ in range(CLEANINGS):
+        pulling = joined.sides[(joined.tension(tau) > 0).any(axis=1)]
+        if not len(pulling):
+            return
+        chosen = np.zeros(joined.mesh.n_stars, bool)
+        cell, local = joined.mesh.cell[pulling, 0], joined.mesh.local[pulling, 0]
+        chosen[joined.mesh.star[cell[:, None], others(joined.mesh.dim)[local]]] = True
+        improver.visit(chosen, tau)
+
+
+def _with_contact(joined: Joined, exterior: Exterior, tau: FloatArray) -> Exterior:
+    """Put the pressures found on contact facets among the imposed tractions."""
+    mesh = joined.separate
+    area = np.linalg.norm(mesh.outward[mesh.cell[:, 0], mesh.local[:, 0]], axis=1)
+    row = np.full(len(mesh.nodes), -1)
+    row[mesh.boundary] = np.arange(len(mesh.boundary))
+    traction = exterior.traction.copy()
+    sides = joined.separate_sides()
+    traction[row[sides]] = tau[sides] / area[sides, None, None]
+    return Exterior(traction, exterior.free, exterior.body)
 
 
 def stress_at_corners(mesh: Simplices, tractions: FloatArray, cells: IntArray | slice = slice(None)) -> FloatArray:

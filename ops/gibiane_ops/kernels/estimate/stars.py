@@ -14,8 +14,14 @@ from gibiane_ops.kernels.estimate.simplices import Simplices, colours, others, s
 PENALTY = 1e5
 """Weight of the balance of each cell over the energy, in the augmented Lagrangian of a star."""
 
+STOP = 1e3
+"""Stiffness against tension of contact facets, over that of a traction."""
+
 UZAWA = 3
 """Solutions with one factor: the balance is met to round-off after the third."""
+
+UZAWA_PRESSED = 8
+"""The same where tension is pushed back, which makes the energy stiffer."""
 
 CHUNK = 64
 """Stars that are assembled together."""
@@ -113,6 +119,8 @@ class Improver:
         Projector on the directions in which the traction of each side may change.
     pull : (m, n_t) float64, optional
         What a stress that is not uniform in the cells adds, see `pieces.Aim`.
+    pressed : ((n_sides, d), (n_sides,)) float64, optional
+        Normals of the sides whose tractions must push, zero for others, and what is kept of their pressure (force).
     """
 
     def __init__(
@@ -122,10 +130,11 @@ class Improver:
         compliance: FloatArray,
         free: FloatArray,
         pull: FloatArray | None = None,
+        pressed: tuple[FloatArray, FloatArray] | None = None,
     ) -> None:
         dim = mesh.dim
         self.mesh, self.stress, self.compliance, self.free = mesh, stress, compliance, free
-        self.pull = pull
+        self.pull, self.pressed = pull, pressed
         movable = np.flatnonzero(free.any(axis=(1, 2)))
         corner = others(dim)[mesh.local[movable, 0]]
         star = mesh.star[mesh.cell[movable, 0][:, None], corner]
@@ -173,7 +182,7 @@ class Improver:
         left = VISITS * self.n_used
         if self.gain is None:
             self.gain = np.zeros(self.mesh.n_stars)
-            self._visit(np.ones(self.mesh.n_stars, bool), tau)
+            self.visit(np.ones(self.mesh.n_stars, bool), tau)
             left -= self.n_used
         while left > 0:
             order = np.argsort(-self.gain, kind="stable")
@@ -184,10 +193,10 @@ class Improver:
             count = min(max(count, int(SHARE * self.n_used), LEAST), left)
             chosen = np.zeros(self.mesh.n_stars, bool)
             chosen[order[:count]] = True
-            self._visit(chosen, tau)
+            self.visit(chosen, tau)
             left -= count
 
-    def _visit(self, chosen: NDArray[np.bool_], tau: FloatArray) -> None:
+    def visit(self, chosen: NDArray[np.bool_], tau: FloatArray) -> None:
         """Improve the stars chosen, colour after colour."""
         for stars in self.colours:
             some = stars[chosen[stars]]
@@ -218,6 +227,7 @@ class Improver:
         partial = np.flatnonzero(self.partly[mesh.side[cells[:, None], sides]].any(axis=1))
         if len(partial):
             self._project(mesh.side[cells[:, None], sides][partial], partial, H, B, descent)
+        stiff = STOP * float(np.einsum("kaaii->", H)) / (k * dim * block)
         weight = PENALTY * np.einsum("kaaii->k", H) / (B**2).sum(axis=(1, 2, 3))
         H += weight[:, None, None, None, None] * np.matmul(B[:, :, None], B[:, None].swapaxes(3, 4))
 
@@ -249,17 +259,45 @@ class Improver:
             return total.reshape(len(stars), -1)
 
         start = gathered(descent)
+        turns = UZAWA
+        if self.pressed is not None and self._press(
+            tau, moved, here, at, stiff, A, start.reshape(len(stars), size, dim, dim)
+        ):
+            turns = UZAWA_PRESSED
         right, push = start, np.zeros((k, B.shape[3]))
         solve = _factored(A.reshape(len(stars), size * block, -1))
-        for turn in range(UZAWA):
+        for turn in range(turns):
             x = solve(right).reshape(len(stars), size, block)
-            if turn < UZAWA - 1:
+            if turn < turns - 1:
                 local = np.where(known[..., None], x[row[:, None], place], 0.0)
                 push += weight[:, None] * np.einsum("kair,kai->kr", B, local)
                 right = start - gathered(np.einsum("kair,kr->kai", B, push))
         tau[moved] += x[here, at].reshape(-1, dim, dim)
         if self.gain is not None:
             self.gain[stars] = np.maximum((x.reshape(start.shape) * start).sum(axis=1), 0.0)
+
+    def _press(
+        self,
+        tau: FloatArray,
+        moved: IntArray,
+        star: IntArray,
+        place: IntArray,
+        stiff: float,
+        A: FloatArray,
+        start: FloatArray,
+    ) -> bool:
+        """Push the corners that pull, or nearly, back to a small pressure; tell whether there are any."""
+        assert self.pressed is not None
+        dim = self.mesh.dim
+        normal, keep = self.pressed
+        n = normal[moved]
+        over = np.einsum("sai,si->sa", tau[moved], n) + keep[moved, None]
+        row, corner = np.nonzero((over > 0) & (np.abs(n).max(axis=1) > 0)[:, None])
+        s, p, n = star[row], place[row], n[row]
+        blocks = A.reshape(len(A), start.shape[1], dim, dim, start.shape[1], dim, dim)
+        blocks[s, p, corner, :, p, corner, :] += stiff * n[:, :, None] * n[:, None, :]
+        start[s, p, corner] -= stiff * over[row, corner, None] * n
+        return bool(len(row))
 
     def _project(self, sides: IntArray, partial: IntArray, H: FloatArray, B: FloatArray, descent: FloatArray) -> None:
         """Keep the directions that are free on sides where only some are."""
