@@ -32,10 +32,6 @@ ERRE = extend("ERREUR")
 CLOSED = 1e-9
 """Largest opening of a closed pair, over the largest relative displacement."""
 
-FROZEN = (
-    "the bound holds for the neighbouring problem of Tresca: MODE 'FROTTANT' 'TRESCA' and MATE 'SEUI' with MU times the "
-    "pressure found"
-)
 FLAT = 1e-6
 """Largest angle between the normals of facets and nodes of a contact surface that counts as plane."""
 
@@ -104,7 +100,7 @@ def _bound_with_contact(
         doubts.append(_unlawful(max([solid.tension, *tensions])))
     cutting = exact_pieces(ctx, pieces, outside)
     doubts += [cutting] if cutting else []
-    guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), FROZEN if "Coulomb" in doubts else None)
+    guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
     more = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
     return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, more)
 

@@ -23,7 +23,8 @@ ERRE = operator(
     "often 0.6 to 0.95 of the error. 'RESI', explicit residuals: an estimate up to a factor ('CONS'), not a bound. "
     "'RDC', constitutive relation error on linear elements: a stress in exact equilibrium with the supports and loads "
     "given ('PRES', 'FSUR', 'VOLU'); guaranteed: not below the error, and 10 to 25 % above it after two sweeps "
-    "('BALA'); bricks are cut into tetrahedra, and it is guaranteed where they are parallelepipeds. A facet counts as held where BLOQ holds all its nodes. 'EXAC': the true error, from an exact stress "
+    "('BALA'); bricks are cut into tetrahedra, and it is guaranteed where they are parallelepipeds. A facet "
+    "counts as held where BLOQ holds all its nodes. 'EXAC': the true error, from an exact stress "
     "or a procedure ('PROC'). 'CONTACT' adds the contact part: an estimate, except with 'RDC', where the sum is "
     "guaranteed without friction and with Tresca's, when contact tractions within the law exist; never with "
     "Coulomb's: GARANTI and a note tell.",

@@ -167,7 +167,7 @@ MECHANICS = {
     "{count} patches have too few elements to see every curvature: there the stress is taken straight": "{count} ensembles ont trop peu d'éléments pour voir toutes les courbures : la contrainte y est prise droite",
     "two layers of elements or more, or LISSER 'MOYE'": "deux couches d'éléments ou plus, ou LISSER 'MOYE'",
     "the equilibrium of the stress is violated by {share} of its tractions: the estimate is not a bound": "l'équilibre de la contrainte est violé de {share} de ses vecteurs contrainte : l'estimation n'est pas une borne",
-    "the bound holds for the neighbouring problem of Tresca: MODE 'FROTTANT' 'TRESCA' and MATE 'SEUI' with MU times the pressure found": "la borne vaut pour le problème voisin de Tresca : MODE 'FROTTANT' 'TRESCA' et MATE 'SEUI' avec MU fois la pression trouvée",
+    "the bound holds for the same problem with Tresca's friction: MATE 'SEUI' of MU times PN (COFR)": "la borne vaut pour le même problème avec le frottement de Tresca : MATE 'SEUI' égal à MU fois PN (COFR)",
     "the estimate is not a bound: {reason}": "l'estimation n'est pas une borne : {reason}",
     "contact tractions in balance are built on facets of linear elements only, not on {shape}": "les vecteurs contrainte de contact en équilibre ne se construisent que sur des facettes d'éléments linéaires, non sur des {shape}",
     "{count} contact facets have no facet of a solid with the same nodes: tractions cannot be opposite there": "{count} facettes de contact n'ont pas de facette de solide aux mêmes noeuds : les vecteurs contrainte ne peuvent y être opposés",

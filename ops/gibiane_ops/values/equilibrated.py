@@ -36,11 +36,20 @@ UNBALANCED = 1e-7
 """Largest force left at a node, over the largest nodal force of an element."""
 
 
-def guarantee_of(ctx: Context, found: Admissible, doubt: str = "", hint: str | None = None) -> Guarantee:
+def guarantee_of(ctx: Context, found: Admissible, doubt: str = "", coulomb: bool = False) -> Guarantee:
     """Say whether the equilibrium was found to hold to round-off, and nothing else is in `doubt`; if not, warn."""
     if doubt:
         reason = f"not guaranteed ({doubt})"
-        ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason, hint=hint)
+        if coulomb:
+            ctx.warn(
+                "G411",
+                "the estimate is not a bound: {reason}",
+                level=0,
+                reason=reason,
+                hint="the bound holds for the same problem with Tresca's friction: MATE 'SEUI' of MU times PN (COFR)",
+            )
+        else:
+            ctx.warn("G411", "the estimate is not a bound: {reason}", level=0, reason=reason)
         return Guarantee(False, reason)
     if found.residual <= ROUND_OFF:
         return GUARANTEED
