@@ -10,6 +10,7 @@ import gc
 import json
 import os
 import platform
+import statistics
 import time
 import tracemalloc
 from collections.abc import Callable, Mapping
@@ -23,7 +24,7 @@ import pytest
 from gibiane_ops.kernels.elements.table import shape
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("numpy", "scipy", "rslab", "pyamg", "pypardiso", "scikit-sparse", "scikit-fem", "lark")
+PACKAGES = ("numpy", "scipy", "rslab", "pyamg", "pypardiso", "scikit-sparse", "scikit-fem", "kvxopt", "lark")
 HEAD = ("what", "size", "ours s", "peer", "peer s", "ratio", "aim")
 
 
@@ -46,25 +47,27 @@ class Bench:
         best_of: bool = False,
         scale: float = 1.0,
     ) -> None:
-        """Run ours and the peers in turn and keep the shortest time of each.
+        """Run ours and the peers in turn and keep the median time of each; every time is stored.
 
         `aim` is the ratio wanted; with `best_of` it is that to the fastest peer; `scale` is how many units of work
         ours does for one of the peers.
         """
         runs = {"": ours, **peers}
-        times = dict.fromkeys(runs, float("inf"))
+        found: dict[str, list[float]] = {name: [] for name in runs}
         for _ in range(rounds):
             for name, run in runs.items():
                 gc.collect()
                 start = time.perf_counter()
                 run()
-                times[name] = min(times[name], time.perf_counter() - start)
+                found[name].append(time.perf_counter() - start)
+        times = {name: statistics.median(each) for name, each in found.items()}
         own = times.pop("") / scale
         fastest = min(times, key=lambda name: times[name], default="")
         for name, seconds in times.items() or [("", None)]:
             row = {"what": what, "size": size, "ours": own, "peer": name, "peer_time": seconds}
             row["ratio"] = None if seconds is None else own / seconds
             row["aim"] = aim if not best_of or name == fastest else None
+            row["times"] = {"ours": found[""], "peer": found.get(name, [])}
             self.rows.append(row)
 
     def skipped(self, peer: str, package: str) -> None:

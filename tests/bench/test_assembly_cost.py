@@ -26,7 +26,7 @@ def scikit_fem(points, cells):
 
 @pytest.mark.bench
 def test_stiffness_of_cubes(bench, sizes, make_grid):
-    for n in sizes:
+    for n in (n for n in sizes if n < 9):
         points, cells = make_grid(8 * n, 8 * n, 8 * n)
         D = isotropic(E, NU)
 

@@ -58,7 +58,7 @@ def bare_stress(name, points, cells, u):
     return run
 
 
-CASES = {"TRI3": (226, 226), "TET4": (26, 26, 26), "CUB8": (46, 46, 46)}
+CASES = {"TRI3": (388, 388), "TET4": (37, 37, 37), "CUB8": (67, 67, 67)}
 
 
 @pytest.mark.bench
@@ -82,7 +82,7 @@ def test_stresses(bench, make_grid, name):
 
 @pytest.mark.bench
 def test_pressure(bench, make_grid):
-    points, cells = make_grid(316, 316, 1)
+    points, cells = make_grid(548, 548, 1)
     session, _ = session_of("CUB8", points, cells)
     faces = cells[:, [4, 5, 6, 7]]
     store = node_store(session)
@@ -101,10 +101,10 @@ def test_pressure(bench, make_grid):
 
 @pytest.mark.bench
 def test_unions_and_merges(bench, make_grid):
-    points, cells = make_grid(46, 46, 46)
+    points, cells = make_grid(67, 67, 67)
     session, _ = session_of("CUB8", points, cells)
     store = node_store(session)
-    session.globals.names["W"] = Maillage.of(store, "CUB8", store.add(points + [46.0, 0, 0])[cells])
+    session.globals.names["W"] = Maillage.of(store, "CUB8", store.add(points + [67.0, 0, 0])[cells])
 
     def bare():
         return np.einsum("mni->mi", np.concatenate([points[cells], points[cells]]), optimize=True)

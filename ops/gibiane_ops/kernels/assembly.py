@@ -221,11 +221,12 @@ def assemble_vector(n_nodes: int, d: int, blocks: Sequence[tuple[IntArray, Float
     -------
     (n_nodes * d,) float64
     """
-    total = np.zeros(n_nodes * d)
+    total = np.zeros((n_nodes, d))
     for cells, Fe in blocks:
-        unknowns = cells[:, :, None] * d + np.arange(d)
-        total += np.bincount(unknowns.ravel(), Fe.ravel(), minlength=n_nodes * d)
-    return total
+        nodes = cells.ravel()
+        for i in range(d):
+            total[:, i] += np.bincount(nodes, Fe[..., i].ravel(), minlength=n_nodes)
+    return total.ravel()
 
 
 def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
@@ -338,8 +339,9 @@ def pressure_load(face_shape: Shape, X: FloatArray, p: ArrayLike, *, axisymmetri
     at_points = value @ N.T if value.ndim == 2 else np.broadcast_to(value[..., None], (len(X), len(weights)))
     if axisymmetric:
         at_points = at_points * geometry.circumferences(face_shape, X, points)
-    flux = geometry.normal_densities(face_shape, X, points) * (at_points * weights)[..., None]
-    return np.asarray(-np.matmul(N.T, flux), np.float64)
+    flux = geometry.normal_densities(face_shape, X, points)
+    flux *= (-at_points * weights)[..., None]
+    return np.asarray(np.matmul(flux.transpose(0, 2, 1), N).transpose(0, 2, 1), np.float64)
 
 
 def distributed_load(shape: Shape, X: FloatArray, density: ArrayLike, *, axisymmetric: bool = False) -> FloatArray:
