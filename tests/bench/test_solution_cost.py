@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 from importlib.util import find_spec
-
 from pathlib import Path
 
 import numpy as np
