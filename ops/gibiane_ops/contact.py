@@ -21,7 +21,7 @@ COFR = operator(
     notice="On the nodes of the slave surface: PN normal pressure (positive in compression), PT1 PT2 friction "
     "traction, GN gap, GT1 GT2 slip, ETAT status (0 open, 1 stick, 2 slip). REA holds the contact "
     "forces, REAC RC U. Pressure and traction are nodal forces divided by the mass matrix of the "
-    "facets, or by its row sums with 'LUMP'.",
+    "facets, or by its row sums with 'LUMP'; between different meshes by mortar ('MORT'), by the area of the node.",
     example="OPTI DIME 2 ELEM QUA4 MODE PLAN DEFO ;\n"
     "V1 = (DROI 2 (0 -1) (1 -1)) TRAN 2 (0 1) ; V2 = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "G1 = CONT V1 ELEM 'APPU' 'STRI' (V1 POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"

@@ -55,11 +55,11 @@ MATE = operator(
     "YG1 YG2 NU12 G12 in plane stress, YG3 NU13 NU23 too in the other plane modes, G13 G23 too in space; "
     "ALP1 ALP2 ALP3; the axes are those of space, or given by 'DIRECTION' V1 (V2 in space: the plane of the first "
     "two axes) or 'RADIAL' P1 (P2: an axis in space; the first direction leaves it), turned by 'INCLINE' A "
-    "degrees. Bars: YOUN, SECT (section). Contact: MU (friction coefficient), COHE (cohesion, added to MU times the "
-    "pressure), SEUI (Tresca's bound), KT (stiffness of the elastic slip), EXPO VREF (Norton-Hoff), ADHE (tension "
-    "that surfaces in contact withstand before they come off for good), JEU (initial gap, instead of the one of the "
-    "geometry): numbers, or CHPOINT on the slave surface. A value is a number, or a CHPOINT or MCHAML, of which each "
-    "element takes its mean.",
+    "degrees. Bars: YOUN, SECT (section). Contact: MU (friction coefficient), COHE (cohesion, added to MU times "
+    "the pressure), SEUI (Tresca's bound), KT (stiffness of the elastic slip), EXPO VREF (Norton-Hoff), ADHE "
+    "(tension that surfaces in contact withstand before they come off for good), JEU (initial gap, instead of "
+    "the one of the geometry: 0. for curved surfaces in touch whose facets cross): numbers, or CHPOINT on the "
+    "slave surface. A value is a number, or a CHPOINT or MCHAML, of which each element takes its mean.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 1 (0 0) (1 0)) TRAN 1 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ; LIST 'RESU' MA ;",
     see=["MODELISER", "RIGIDITE", "EPTH", "CARACTERISTIQUE"],

@@ -12,7 +12,7 @@ from gibiane_ops.kernels import errors as k_errors
 from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.mortar import mortar_pairs
-from gibiane_ops.kernels.contact.node_facet import node_facet_pairs
+from gibiane_ops.kernels.contact.node_facet import are_inside, node_facet_pairs
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
 from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs, with_surface
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
@@ -129,7 +129,7 @@ def _looking_away(points: FloatArray, zone: ContactZone) -> ContactPairs:
 def _node_pairs(points: FloatArray, zone: ContactZone, axis: bool) -> ContactPairs | None:
     """Pair coincident nodes, and those left on both sides that face each other across less than half an edge.
 
-    None when nodes of both surfaces stay alone, unless pairs are asked for.
+    None when nodes of both surfaces stay alone, or nodes of one before facets of the other, unless pairs are asked for.
     """
     slave, master = zone.slave.kernel_blocks, zone.master.kernel_blocks
     edges = [np.linalg.norm(points[c] - points[np.roll(c, 1, axis=1)], axis=2).min() for _, c in slave if len(c)]
@@ -142,7 +142,15 @@ def _node_pairs(points: FloatArray, zone: ContactZone, axis: bool) -> ContactPai
             if limits and zone.kinematics == "NOEU":
                 raise
             continue
-        if not len(found.unpaired_slave) or not len(found.unpaired_master):
+        whole = not len(found.unpaired_slave) or not len(found.unpaired_master)
+        # nodes past the border of the smaller surface are ignored, those of a finer mesh before it are not
+        if whole and (
+            zone.kinematics == "NOEU"
+            or not (
+                are_inside(points, found.unpaired_slave, slave, master)
+                or are_inside(points, found.unpaired_master, master, slave)
+            )
+        ):
             return found
     return found if zone.kinematics == "NOEU" else None
 

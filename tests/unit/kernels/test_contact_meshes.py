@@ -8,7 +8,7 @@ from tests.scenes.two_grids import areas, grid, turned
 from gibiane_ops.kernels.contact.clip import clip, fan
 from gibiane_ops.kernels.contact.facets import middles_of, surface_of, transformation
 from gibiane_ops.kernels.contact.mortar import mortar_pairs
-from gibiane_ops.kernels.contact.node_facet import node_facet_pairs
+from gibiane_ops.kernels.contact.node_facet import are_inside, node_facet_pairs
 from gibiane_ops.kernels.contact.overlaps import overlaps
 from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, node_pairs
 from gibiane_ops.kernels.contact.ties import tie_contact
@@ -387,3 +387,16 @@ def test_middles_of_a_surface_come_once() -> None:
     found = middles_of(slave)
     assert len(found) == 12
     assert len(np.unique(found[:, 0])) == 12
+
+
+def test_nested_meshes_are_different_meshes() -> None:
+    """All nodes of the coarse side coincide with nodes of the fine one, which has others before the coarse facets."""
+    points, slave, master = two("QUA4", 4, 2)
+    pairs = node_pairs(points, slave, master)
+    assert len(pairs.pairs) == 9
+    assert are_inside(points, pairs.unpaired_slave, slave, master)
+    # a smaller block on a larger one: the others lie beside it
+    points[: len(np.unique(slave[0][1])), :2] *= 2.0
+    pairs = node_pairs(points, slave, master)
+    assert len(pairs.pairs) == 9
+    assert not are_inside(points, pairs.unpaired_slave, slave, master)

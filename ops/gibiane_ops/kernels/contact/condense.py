@@ -251,6 +251,8 @@ class _Fields:
             return _Fields(Bv, Bw, B0, reduction.fixed, tied, relations, Bv)
         right = sp.csc_array(unit - relations @ Bw)
         touched = np.flatnonzero(np.diff(right.indptr))
+        if not len(touched):
+            touched = np.zeros(1, np.int64)  # relations away from contact: one column of zeros
         second = reduce_conditions(relations @ Bv, right[:, touched].toarray())
         chosen = sp.eye_array(Bv.shape[1], format="csr")
         T = chosen[:, second.free] + chosen[:, second.tied] @ second.relation

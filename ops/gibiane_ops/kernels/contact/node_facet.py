@@ -119,6 +119,32 @@ def node_facet_pairs(
     return found.on_changed_basis()
 
 
+def are_inside(points: FloatArray, nodes: IntArray, own: Sequence[Block], other: Sequence[Block]) -> bool:
+    """Tell whether some nodes of a surface lie in front of facets of another, rather than beside it.
+
+    Parameters
+    ----------
+    points : (n_points, d) float64, length
+    nodes : (k,) int64
+        Nodes of `own`.
+    own, other : sequence of (shape name, (m, n_nodes) int64)
+
+    Returns
+    -------
+    bool
+    """
+    if not len(nodes):
+        return False
+    try:
+        found = node_facet_pairs(points, own, other)
+    except EmptyContact:
+        return False
+    foot = -(found.matrix(len(points)) @ points - found.on_pairs(points[found.pairs[:, 0]]))
+    here = found.on_pairs(points[found.pairs[:, 0]] + found.at_nodes(found.gap)[:, None] * found.normals)
+    caught_up = np.linalg.norm(foot - here, axis=1) > 1e-3 * found.size
+    return bool(np.isin(nodes, found.pairs[~caught_up, 0]).any())
+
+
 def _entries(
     master: Sequence[Block], block: IntArray, facet: IntArray, xi: FloatArray
 ) -> tuple[IntArray, IntArray, FloatArray]:
