@@ -66,8 +66,12 @@ def mesh(name: str, seed: int = 0, distortion: float = 0.15, counts: tuple[int, 
     return with_middles(name, points, cells) if name in CORNERS else (points, cells)
 
 
-def law(name: str) -> np.ndarray:
-    return isotropic(E, NU, "TRID" if SHAPES[name].dim == 3 else "DEFO")
+def law(name: str, mode: str = "DEFO") -> np.ndarray:
+    return isotropic(E, NU, "TRID" if SHAPES[name].dim == 3 else mode)
+
+
+# Every element in each of its modes: space, plane strain, plane stress (AXIS has its own patch test below).
+IN_MODES = [(name, mode) for name in NAMES for mode in (("TRID",) if SHAPES[name].dim == 3 else ("DEFO", "CONT"))]
 
 
 def stiffness(name: str, points: np.ndarray, cells: np.ndarray, D: np.ndarray | None = None) -> sp.csr_array:
@@ -79,10 +83,10 @@ def fixed(unknowns: np.ndarray, n: int) -> sp.csr_array:
     return sp.csr_array((np.ones(len(unknowns)), (np.arange(len(unknowns)), unknowns)), shape=(len(unknowns), n))
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "mode"), IN_MODES)
 @settings(max_examples=8, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 10_000))
-def test_patch(name: str, seed: int) -> None:
+def test_patch(name: str, mode: str, seed: int) -> None:
     """A linear field prescribed on the boundary of a distorted mesh is found inside, with constant stress."""
     points, cells = mesh(name, seed)
     dim = points.shape[1]
@@ -90,24 +94,24 @@ def test_patch(name: str, seed: int) -> None:
     exact = points @ A.T
     skin = np.unique(np.concatenate([f.nodes.ravel() for f in topology.boundary([(name, cells)]).values()]))
     unknowns = (skin[:, None] * dim + np.arange(dim)).ravel()
-    K = stiffness(name, points, cells)
+    K = stiffness(name, points, cells, law(name, mode))
     reduction = reduce_conditions(fixed(unknowns, points.size), exact[skin].ravel())
     load = reduction.load(K, np.zeros(points.size))
     u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), load)).reshape(-1, dim)
     assert len(skin) < len(points)
     assert np.allclose(u, exact, atol=1e-12 * np.abs(exact).max())
     each = SHAPES[name]
-    stress = assembly.stresses(assembly.strains(each, points[cells], u[cells], each.gauss[0]), law(name))
+    stress = assembly.stresses(assembly.strains(each, points[cells], u[cells], each.gauss[0]), law(name, mode))
     H = np.zeros((3, 3))
     H[:dim, :dim] = A
-    constant = law(name) @ strain_vector((H + H.T) / 2, stress.shape[-1])
+    constant = law(name, mode) @ strain_vector((H + H.T) / 2, stress.shape[-1])
     assert np.abs(stress - constant).max() < 1e-11 * np.abs(constant).max()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_rigid_modes_and_nothing_else(name: str) -> None:
+@pytest.mark.parametrize(("name", "mode"), IN_MODES)
+def test_rigid_modes_and_nothing_else(name: str, mode: str) -> None:
     points, cells = mesh(name, 4, counts=(2, 1, 1)[: SHAPES[name].dim])
-    K = stiffness(name, points, cells).toarray()
+    K = stiffness(name, points, cells, law(name, mode)).toarray()
     values = np.linalg.eigvalsh(K)
     n_rigid = 6 if points.shape[1] == 3 else 3
     assert np.abs(values[:n_rigid]).max() < 1e-12 * values[-1]
@@ -115,10 +119,10 @@ def test_rigid_modes_and_nothing_else(name: str) -> None:
     assert np.abs(K @ rigid_modes(points)).max() < 1e-11 * values[-1]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_single_elements_have_no_spurious_mode(name: str) -> None:
+@pytest.mark.parametrize(("name", "mode"), IN_MODES)
+def test_single_elements_have_no_spurious_mode(name: str, mode: str) -> None:
     each = SHAPES[name]
-    values = np.linalg.eigvalsh(assembly.element_stiffness(each, each.ref_nodes[None], law(name))[0])
+    values = np.linalg.eigvalsh(assembly.element_stiffness(each, each.ref_nodes[None], law(name, mode))[0])
     assert np.count_nonzero(values < 1e-9 * values[-1]) == (6 if each.dim == 3 else 3)
 
 
