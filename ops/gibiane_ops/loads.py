@@ -20,7 +20,7 @@ from gibiane_ops.values.conditions import family, support
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.material import MATERIAL, on_zone, properties, solid_zones
-from gibiane_ops.values.mechanics import corners
+from gibiane_ops.values.mechanics import checked_corners
 from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
@@ -272,7 +272,7 @@ def _cneq(ctx: Context, model: Modele, field: ChPoint | MChaml, cara: MChaml | N
             if cara is None:
                 raise ctx.operands.missing(MCHAML, "the section of the bars (CARA MODL 'SECT' ...)")
             density = density * properties(ctx, cara, zone, ("SECT",), "cara")[..., None, None]
-        x = corners(ctx, zone)
+        x = checked_corners(ctx, zone)
         with worded(ctx, at="model"):
             each = assembly.distributed_load(shape(zone.shape), x, density, axisymmetric=zone.axisymmetric)
         forces.append((zone.cells, each))

@@ -19,7 +19,7 @@ from gibiane_ops.values.failures import worded
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.material import properties, solid_zones
-from gibiane_ops.values.mechanics import corners
+from gibiane_ops.values.mechanics import checked_corners
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 from gibiane_ops.values.rigidite import MatrixPart, Rigidite
@@ -60,7 +60,7 @@ def _masses(ctx: Context, model: Modele, material: MChaml, lumped: bool) -> Rigi
     for zone in zones:
         wanted = ("RHO", "SECT") if zone.bars else ("RHO",)
         density = properties(ctx, material, zone, wanted, "material", "a mass matrix needs RHO, and SECT for bars")
-        of, x = shape(zone.shape), corners(ctx, zone)
+        of, x = shape(zone.shape), checked_corners(ctx, zone)
         compute = assembly.lumped_mass if lumped else assembly.element_mass
         with worded(ctx, at="model"):
             each = compute(of, x, density.prod(axis=-1), axisymmetric=zone.axisymmetric)

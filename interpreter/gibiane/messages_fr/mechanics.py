@@ -203,7 +203,7 @@ MECHANICS = {
     "on Debian: apt install {package}": "sous Debian : apt install {package}",
     "the package {package} is not installed": "le paquet {package} n'est pas installé",
     "{what} = {value} is out of bounds: {limit}": "{what} = {value} est hors bornes : {limit}",
-    "{count} {shape} with a negative or zero Jacobian: first element {number}, Jacobian {value}, corners {where}": "{count} {shape} de jacobien négatif ou nul : premier élément {number}, jacobien {value}, sommets {where}",
+    "{count} {shape} with a negative or zero Jacobian: elements {numbers}; element {number}, Jacobian {value}, corners {where}": "{count} {shape} de jacobien négatif ou nul : éléments {numbers} ; élément {number}, jacobien {value}, sommets {where}",
     "models with {word} are not available yet": "les modèles avec {word} ne sont pas encore disponibles",
     "there are elastic solids, bars, and contact with or without friction": "il y a des solides élastiques, des barres, et du contact avec ou sans frottement",
     "its sides cross, or its corners are aligned": "ses côtés se croisent, ou ses coins sont alignés",

@@ -19,6 +19,7 @@ from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.material import on_zone, solid_zones
+from gibiane_ops.values.mechanics import checked_corners
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, NodeStore, node_store
 from gibiane_ops.values.parts import model_part
@@ -267,7 +268,6 @@ def _intg(ctx: Context, model: Modele, field: MChaml, elem: bool, name: str | No
             )
         name = field.names[0]
     name = name.strip()
-    coords = node_store(ctx).coords
     zones = []
     for zone in solid_zones(ctx, model):
         values = on_zone(ctx, field, zone, "field")
@@ -279,7 +279,7 @@ def _intg(ctx: Context, model: Modele, field: MChaml, elem: bool, name: str | No
                 name=name,
                 known=" ".join(values.names),
             )
-        corners = coords[zone.cells][..., : zone.dim]
+        corners = checked_corners(ctx, zone)
         column = values.component(name)[..., None]
         total = integrals(shape(zone.shape), corners, column, field.support, axisymmetric=zone.axisymmetric)
         zones.append(ChamZone(zone, [SCAL], total[:, None, :]))
@@ -309,14 +309,13 @@ GRAD = operator(
     gives=[MCHAML],
 )
 def _grad(ctx: Context, model: Modele, field: ChPoint, cara: MChaml | None) -> MChaml:
-    coords = node_store(ctx).coords
     zones = []
     for zone in solid_zones(ctx, model):
         of = shape(zone.shape)
         axes = ("R", "Z") if zone.mode == "AXIS" else ("X", "Y", "Z")[: zone.dim]
         names = [n for n in field.names if len(np.intersect1d(field.parts[n][0], zone.cells))]
         nodal = field.table(names, zone.cells.ravel()).reshape(*zone.cells.shape, len(names))
-        gradient, _ = geometry.gradients(of, coords[zone.cells][..., : zone.dim], of.gauss[0])
+        gradient, _ = geometry.gradients(of, checked_corners(ctx, zone), of.gauss[0])
         values = np.einsum("mqnd,mnc->mqcd", gradient, nodal)
         zones.append(ChamZone(zone, [f"{n},{a}" for n in names for a in axes], values.reshape(*values.shape[:2], -1)))
     return MChaml(zones, "GRADIENT", "STRESSES")

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import N_COMPONENTS, FloatArray, IntArray, component_of, stress_tensor
 from gibiane_ops.kernels.elements.shape import Shape
+from gibiane_ops.kernels.errors import InvertedElement
 
 # Elements treated together: large enough to hide the interpreter, small enough to stay in the caches.
 CHUNK = 1024
@@ -229,7 +230,9 @@ def assemble_vector(n_nodes: int, d: int, blocks: Sequence[tuple[IntArray, Float
     return total.ravel()
 
 
-def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
+def strains(
+    shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisymmetric: bool = False, checked: bool = False
+) -> FloatArray:
     """Compute the strains of a displacement field.
 
     Parameters
@@ -241,6 +244,8 @@ def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisy
     xi : (q, dim) float64
         Off the axis, where the hoop strain divides by the radius.
     axisymmetric : bool
+    checked : bool
+        Refuse cells whose jacobian is not positive there.
 
     Returns
     -------
@@ -252,7 +257,11 @@ def strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisy
     found = np.empty((len(X), len(xi), N_COMPONENTS[dim]))
     for start in range(0, len(X), CHUNK):
         part = slice(start, start + CHUNK)
-        H = geometry.vector_gradients(shape, X[part], U[part], xi)
+        try:
+            H = geometry.vector_gradients(shape, X[part], U[part], xi, checked=checked)
+        except InvertedElement:
+            geometry.check_cells(shape, X, xi)  # the same failure, with the numbers of all cells
+            raise
         if dim == 2:
             found[part, :, component_of(2, 2)] = 0.0
         for i in range(dim):

@@ -173,7 +173,9 @@ def gradients(shape: Shape, X: FloatArray, xi: FloatArray) -> tuple[FloatArray, 
     return np.matmul(shape.dN(xi), _inverses(J, det)), det
 
 
-def vector_gradients(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray) -> FloatArray:
+def vector_gradients(
+    shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, checked: bool = False
+) -> FloatArray:
     """Compute the derivatives of a vector by the coordinates.
 
     Parameters
@@ -184,6 +186,8 @@ def vector_gradients(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray)
     U : (m, n_nodes, d) float64
         Nodal values.
     xi : (q, dim) float64
+    checked : bool
+        Refuse cells whose jacobian is not positive there.
 
     Returns
     -------
@@ -191,7 +195,10 @@ def vector_gradients(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray)
         ``d u_i / d x_j``. Each component lies contiguous in memory, which is what sums of components want.
     """
     J, G = (_by_component(jacobians(shape, values, xi)) for values in (X, U))
-    inverse = _inverses(J, _determinants(J))
+    det = _determinants(J)
+    if checked and not (det > 0).all():
+        check_cells(shape, X, xi)
+    inverse = _inverses(J, det)
     found = np.empty((G.shape[2], J.shape[2], *J.shape[:2])).transpose(2, 3, 0, 1)
     for i in range(found.shape[2]):
         for j in range(found.shape[3]):

@@ -19,11 +19,12 @@ def worded(ctx: Context, *, at: str | None = None) -> Iterator[None]:
         where = ", ".join("(" + " ".join(f"{x:g}" for x in corner) + ")" for corner in failure.corners[0][:4])
         ctx.fail(
             195,
-            "{count} {shape} with a negative or zero Jacobian: first element {number}, Jacobian {value}, "
+            "{count} {shape} with a negative or zero Jacobian: elements {numbers}; element {number}, Jacobian {value}, "
             "corners {where}",
             at=at,
             count=len(failure.ids),
             shape=failure.shape,
+            numbers=" ".join(str(int(i) + 1) for i in failure.ids[:6]) + (" ..." if len(failure.ids) > 6 else ""),
             number=first + 1,
             value=f"{failure.volumes[0]:.4g}",
             where=where,

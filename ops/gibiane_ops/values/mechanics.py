@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels import assembly, bars
+from gibiane_ops.kernels import assembly, bars, geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.failures import worded
@@ -17,6 +17,15 @@ from gibiane_ops.values.nodes import FloatArray, node_store
 def corners(ctx: Context, zone: ModelZone) -> FloatArray:
     """Return the coordinates of the nodes of the elements, (m, n, d), length."""
     return np.asarray(node_store(ctx).coords[zone.cells][..., : zone.dim], np.float64)
+
+
+def checked_corners(ctx: Context, zone: ModelZone, at: str = "model") -> FloatArray:
+    """Return the coordinates of the nodes of the elements, once they are known to have positive jacobians."""
+    x = corners(ctx, zone)
+    if not zone.bars:
+        with worded(ctx, at=at):
+            geometry.check_cells(shape(zone.shape), x)
+    return x
 
 
 def stiffness(ctx: Context, zone: ModelZone, material: MChaml) -> FloatArray:
@@ -45,7 +54,7 @@ def strains(ctx: Context, zone: ModelZone, u: ChPoint) -> FloatArray:
     with worded(ctx, at="model"):
         if zone.bars:
             return bars.bar_strains(of, x, nodal, xi)
-        return assembly.strains(of, x, nodal, xi, axisymmetric=zone.axisymmetric)
+        return assembly.strains(of, x, nodal, xi, axisymmetric=zone.axisymmetric, checked=True)
 
 
 def internal_forces(ctx: Context, zone: ModelZone, stress: FloatArray) -> FloatArray:
