@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from gibiane.forms import Key
 from gibiane.nodes import Name
 from gibiane.registry import Context, Refused, extend
 from gibiane.values import CHPOINT, MAILLAGE, MOT, TABLE, Table
+from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.exchange.formats import FORMATS, write_mesh_file
 from gibiane_ops.kernels.exchange.meshfile import MeshFile
 from gibiane_ops.kernels.topology import group_by_nodes
@@ -39,14 +41,29 @@ def _sort(ctx: Context, q: Operands) -> Any:
     path = output_path(ctx, FORMATS[word].extension)
     content = _content(ctx, meshes, fields)
     try:
-        with worded(ctx):
-            write_mesh_file(path, word, content)
+        _write(ctx, path, word, content)
     except OSError as failure:
         reason = (failure.strerror or "unknown reason").lower()
         ctx.fail(1130, "the file {path} cannot be written ({reason})", path=path.as_posix(), reason=reason)
     if ctx.option("ECHO") >= 1:
         ctx.write(f" SORTIR : {path.as_posix()}")
     return None
+
+
+def _write(ctx: Context, path: Path, word: str, content: MeshFile) -> None:
+    """Write the file; error 16 when the format has not the type of an element."""
+    with worded(ctx):
+        try:
+            write_mesh_file(path, word, content)
+        except BadValue as failure:
+            ctx.fail(
+                16,
+                "{shapes} do not go into a {name} file: {limit}",
+                shapes=failure.value,
+                name=FORMATS[word].name,
+                limit=failure.limit,
+                hint="CHAN changes elements, ELEM chooses some; 'MED' and 'GMSH' hold every type",
+            )
 
 
 def _read(q: Operands) -> tuple[list[tuple[str, Maillage]], list[tuple[str, ChPoint]]]:

@@ -10,7 +10,7 @@ import io
 import warnings
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -223,6 +223,8 @@ def write_mesh_file(path: Path, word: str, mesh: MeshFile) -> None:
     """
     of = FORMATS[word]
     path.parent.mkdir(parents=True, exist_ok=True)
+    if word in ("UNV", "ABAQ"):
+        mesh = _points_apart(mesh)
     if not of.writer:
         for name, _ in mesh.blocks:
             if name not in WRITTEN:
@@ -250,6 +252,22 @@ def write_mesh_file(path: Path, word: str, mesh: MeshFile) -> None:
     except UnreadableFile as failure:
         kinds = ", ".join(name for name, _ in mesh.blocks)
         raise BadValue("elements", kinds, f"elements that a {of.name} file can hold") from failure
+
+
+def _points_apart(mesh: MeshFile) -> MeshFile:
+    """Turn points that are elements (POI1) into groups of nodes, where a format has these and not those."""
+    kept = [i for i, (name, _) in enumerate(mesh.blocks) if name != "POI1"]
+    if len(kept) == len(mesh.blocks) or not kept:
+        return mesh
+    place = {old: new for new, old in enumerate(kept)}
+    groups, nodes = {}, dict(mesh.node_groups)
+    for name, parts in mesh.groups.items():
+        if solid := [(place[p], rows) for p, rows in parts if p in place]:
+            groups[name] = solid
+        for p, rows in parts:
+            if p not in place:
+                nodes[name] = np.unique(np.concatenate([nodes.get(name, rows[:0]), mesh.blocks[p][1][rows].ravel()]))
+    return replace(mesh, blocks=[mesh.blocks[i] for i in kept], groups=groups, node_groups=nodes)
 
 
 def _rounded(points: FloatArray) -> FloatArray:
