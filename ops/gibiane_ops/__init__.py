@@ -171,7 +171,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "DEPIMPOSE": ("gibiane_ops.conditions",),
     "RELA": ("gibiane_ops.relations",),
     "FORCE": ("gibiane_ops.loads",),
-    "PRESSION": ("gibiane_ops.loads",),
+    "PRESSION": ("gibiane_ops.loads", "gibiane_ops.pressures"),
     "FSUR": ("gibiane_ops.loads",),
     "CNEQ": ("gibiane_ops.loads",),
     "RESO": ("gibiane_ops.solve",),

@@ -78,7 +78,8 @@ PRES = operator(
     notice="Consistent forces of a pressure on facets of the boundary of the model; positive, it pushes into "
     "the solid, whichever way the facets turn. The pressure is a number or a CHPOINT (one component); without "
     "facets the CHPOINT acts on those of the boundary that have all their nodes in it. In mode AXIS the forces are "
-    "those of the whole body of revolution.",
+    "those of the whole body of revolution. `PRES MODL 'PRES' p (G)` (or a MCHAML of pressures) on a model "
+    "'CHARGEMENT' 'PRESSION' gives a MCHAML, and BSIG the forces: p acts against the normals of its facets.",
     example=_EXAMPLE + "F = PRES 'MASS' MO 1.E6 (CONT S ELEM 'APPU' 'STRI' (S POIN 'DROI' (0 1) (1 1) 1.E-6)) ;\n"
     "LIST F ;",
     see=["FORCE", "FSUR", "CNEQ"],

@@ -11,7 +11,17 @@ from gibiane_ops.kernels.mesh import orientation
 from gibiane_ops.values.maillage import Block, Maillage
 from gibiane_ops.values.modele import ContactZone, Modele, ModelZone
 
-FORMULATIONS = ("MECANIQUE", "ELASTIQUE", "ISOTROPE", "ORTHOTROPE", "CONTACT", "UNILATERAL", "FROTTANT")
+FORMULATIONS = (
+    "MECANIQUE",
+    "ELASTIQUE",
+    "ISOTROPE",
+    "ORTHOTROPE",
+    "CONTACT",
+    "UNILATERAL",
+    "FROTTANT",
+    "CHARGEMENT",
+    "PRESSION",
+)
 LAWS = ("COULOMB", "TRESCA", "REGULARISE", "NORTON")
 KINEMATICS = ("MESC", "SYME", "FAIB", "MORT", "NOEU", "RIGIDE")
 # Names of finite elements: that of the mesh is the default, and the only one that lines lack is BARR.
@@ -29,7 +39,6 @@ ELSEWHERE = [
     "FISSURE",
     "LIQUIDE",
     "DIFFUSION",
-    "CHARGEMENT",
     "METALLURGIE",
     "ELECTROSTATIQUE",
     "MAGNETODYNAMIQUE",
@@ -94,7 +103,8 @@ MODE = operator(
     "(G417). Linear and quadratic facets. A surface with sharp edges has one normal per side; one zone per side "
     "lets COFR tell their forces apart. Laws after 'FROTTANT': 'COULOMB' (MU, COHE), 'TRESCA' (SEUI), "
     "'REGULARISE' (MU, KT: elastic slip), 'NORTON' (MU, EXPO, VREF). 'RIGIDE': G1 is an obstacle that belongs "
-    "to no solid; its nodes have no unknowns, and the nodes of G2 need not coincide with them.",
+    "to no solid; its nodes have no unknowns, and the nodes of G2 need not coincide with them. "
+    "`MODE G 'CHARGEMENT' 'PRESSION'` makes a surface under pressure: see PRES.",
     example="OPTI DIME 3 ELEM CUB8 ; B = (DROI 1 (0 0 0) (1 0 0)) TRAN 1 (0 1 0) ;\n"
     "V = B VOLU 1 'TRAN' (0 0 1) ; MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ; LIST 'RESU' MO ;",
     see=["MATERIAU", "RIGIDITE"],
@@ -109,7 +119,7 @@ MODE = operator(
     Key("CONS", "name of the part", Arg("part", MOT)),
     syntax="g:MAILLAGE (g2:MAILLAGE) 'MECANIQUE' ('ELASTIQUE' ('ISOTROPE'|'ORTHOTROPE')) ('BARR') | 'CONTACT' "
     "('UNILATERAL'|'FROTTANT' 'COULOMB'|'TRESCA'|'REGULARISE'|'NORTON') ('MESC'|'MORT'|'NOEU'|'SYME'|'FAIB') "
-    "('RIGIDE')",
+    "('RIGIDE') | 'CHARGEMENT' 'PRESSION'",
     gives=[MMODEL],
 )
 def _mode(ctx: Context, q: Operands) -> Modele:
@@ -143,6 +153,10 @@ def _mode(ctx: Context, q: Operands) -> Modele:
         )
     if "CONTACT" in words:
         return _contact_model(ctx, q, meshes, words)
+    if "CHARGEMENT" in words:
+        if len(meshes) != 1:
+            raise q.missing(MAILLAGE, "the surface under pressure")
+        return _pressure_model(ctx, meshes[0])
     if "MECANIQUE" not in words:
         ctx.fail(7, "the formulation is missing", hint="MODE G 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE'")
     if len(meshes) != 1:
@@ -170,6 +184,23 @@ def _solid_model(ctx: Context, mesh: Maillage, words: list[str]) -> Modele:
     law = ("ELASTIQUE", "ORTHOTROPE" if "ORTHOTROPE" in words else "ISOTROPE")
     blocks = [block for block in mesh.blocks if not wanted or block.shape in wanted]
     return Modele([_solid_zone(ctx, mesh, block, law, mode, "BARR" in words) for block in blocks])
+
+
+def _pressure_model(ctx: Context, mesh: Maillage) -> Modele:
+    """Return the model of a surface (in the plane, of a line) that PRES loads."""
+    dim = int(ctx.option("DIME"))
+    mode = ctx.option("MODE") or ("TRID" if dim == 3 else "PLAN DEFO")
+    wrong = [name for name in mesh.shapes if SHAPES[name].dim != dim - 1]
+    if wrong or not mesh.shapes:
+        ctx.fail(
+            16,
+            "a pressure acts on facets, not on {shapes}",
+            at="mesh 1",
+            shapes=" ".join(wrong) or "nothing",
+            hint="FACE, ENVE or CONT give the facets of a solid",
+        )
+    zones = [ModelZone(Maillage(mesh.store, [b]), "CHARGEMENT", ("PRESSION",), mode) for b in mesh.blocks]
+    return Modele([], [], zones)
 
 
 def _solid_zone(ctx: Context, mesh: Maillage, block: Block, law: tuple[str, ...], mode: str, bars: bool) -> ModelZone:

@@ -15,7 +15,7 @@ from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.contact import NEEDS, warn_unpaired, zone_friction, zone_gap, zone_pairs
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
-from gibiane_ops.values.material import on_zone
+from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.parts import model_part
@@ -45,6 +45,7 @@ def _rigi(ctx: Context, model: Modele, material: MChaml | None) -> Any:
         return _contact(ctx, model, material)
     if material is None:
         raise ctx.operands.missing(MCHAML, "the material")
+    solid_zones(ctx, model)
     return _solid(ctx, model, material)
 
 
@@ -136,4 +137,5 @@ def _et(ctx: Context, a: Rigidite, b: Rigidite, more: list[Rigidite]) -> Rigidit
 )
 def _et_models(ctx: Context, a: Modele, b: Modele, more: list[Modele]) -> Modele:
     every = (a, b, *more)
-    return Modele([z for m in every for z in m.zones], [c for m in every for c in m.contacts])
+    loads = [zone for m in every for zone in m.loads]
+    return Modele([z for m in every for z in m.zones], [c for m in every for c in m.contacts], loads)

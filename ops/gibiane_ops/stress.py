@@ -29,6 +29,7 @@ from gibiane_ops.values.material import (
 )
 from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, node_store
+from gibiane_ops.values.pressure import SUBTYPE, pressure_forces
 
 PRINCIPAL = "PRINCIPALE"
 COSINES = tuple(f"{axis}{k}" for k in (1, 2, 3) for axis in ("COX", "COY", "COZ"))
@@ -202,6 +203,8 @@ BSIG = operator(
     Arg("model", MMODEL, "model"), Arg("stress", MCHAML, "stress"), Arg("more", MCHAML, optional=True), gives=[CHPOINT]
 )
 def _bsig(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> ChPoint:
+    if stress.subtype == SUBTYPE:
+        return pressure_forces(ctx, model, stress)
     (stress,) = told_apart(ctx, [("stress", stress), ("more", more)], STRESS)
     store = node_store(ctx)
     zones = solid_zones(ctx, model)

@@ -21,7 +21,7 @@ MECHANICS = {
     "there is no zone {n}: the field has {size}": "il n'y a pas de zone {n} : le champ en a {size}",
     "the field has {count} components: name one": "le champ a {count} composantes : en nommer une",
     "there is no solid zone": "il n'y a pas de zone solide",
-    "the model has no solid, only contact": "le modèle n'a pas de solide, seulement du contact",
+    "the model has no solid": "le modèle n'a pas de solide",
     "one support is wanted, two are given": "il faut un support, deux sont donnés",
     "one component is given twice ({names})": "une composante est donnée deux fois ({names})",
     "no component is given": "aucune composante n'est donnée",

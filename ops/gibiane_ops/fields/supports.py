@@ -18,7 +18,7 @@ from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, chosen
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
-from gibiane_ops.values.material import on_zone, solid_zones
+from gibiane_ops.values.material import field_zones, on_zone, solid_zones
 from gibiane_ops.values.mechanics import checked_corners
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, NodeStore, node_store
@@ -102,7 +102,7 @@ def _to_elements(
     ctx: Context, cham: bool, field: ChPoint, model: Modele, support: str | None, subtype: str | None
 ) -> MChaml:
     zones = []
-    for zone in solid_zones(ctx, model):
+    for zone in field_zones(ctx, model):
         nodal = field.table(field.names, zone.cells.ravel()).reshape(*zone.cells.shape, len(field.names))
         zones.append(ChamZone(zone, field.names, moved(shape(zone.shape), nodal, "NOEUD", support or "NOEUD")))
     return MChaml(zones, subtype.strip() if subtype else SCALAIRE, support or "NOEUD", field.title)

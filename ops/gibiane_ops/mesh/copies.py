@@ -90,7 +90,11 @@ class Copier:
         if isinstance(x, ChPoint):
             return self._field(x)
         if isinstance(x, Modele):
-            return Modele([self._solid(zone) for zone in x.zones], [self._pair(zone) for zone in x.contacts])
+            return Modele(
+                [self._solid(zone) for zone in x.zones],
+                [self._pair(z) for z in x.contacts],
+                [self._solid(z) for z in x.loads],
+            )
         zones = [ChamZone(self._zone(z.zone), z.names, z.values) for z in x.zones]
         return MChaml(zones, x.subtype, x.support, x.title)
 

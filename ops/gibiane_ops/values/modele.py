@@ -116,13 +116,19 @@ class ContactZone:
 
 
 class Modele(Value):
-    """A model: zones of solids and contact zones."""
+    """A model: zones of solids, contact zones, and surfaces under pressure (`loads`)."""
 
     type_name = MMODEL
 
-    def __init__(self, zones: Sequence[ModelZone], contacts: Sequence[ContactZone] = ()) -> None:
+    def __init__(
+        self,
+        zones: Sequence[ModelZone],
+        contacts: Sequence[ContactZone] = (),
+        loads: Sequence[ModelZone] = (),
+    ) -> None:
         self.zones = list(zones)
         self.contacts = list(contacts)
+        self.loads = list(loads)
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the lines that LIST prints."""
@@ -132,5 +138,7 @@ class Modele(Value):
                 f" zone {number} : {zone.mesh.n_cells} element(s) {zone.shape}, {zone.formulation} "
                 f"{' '.join(zone.law)}, mode {zone.mode}"
             )
+        for number, zone in enumerate(self.loads, 1):
+            yield f" chargement {number} : {zone.mesh.n_cells} element(s) {zone.shape}, PRESSION, mode {zone.mode}"
         for number, pair in enumerate(self.contacts, 1):
             yield f" contact {number} : {pair.slave.n_cells} facette(s) sur {pair.master.n_cells}, {pair.law}"
