@@ -40,4 +40,11 @@ GEOMETRY: dict[str, str] = {
     "REDU wants elements of the model itself: ELEM chooses among them": "REDU veut des éléments du modèle lui-même : ELEM choisit parmi eux",
     "contact and unilateral conditions want a symmetric matrix": "le contact et les conditions unilatérales veulent une matrice symétrique",
     "'NOUN' makes equalities of unilateral conditions": "'NOUN' fait des égalités des conditions unilatérales",
+    '{shapes} do not go into a {name} file: {limit}': "{shapes} n'entrent pas dans un fichier {name} : {limit}",
+    "CHAN changes elements, ELEM chooses some; 'MED' and 'GMSH' hold every type": "CHAN change les éléments, ELEM en choisit ; 'MED' et 'GMSH' contiennent tous les types",
+    'contact and pressure are no solids': 'contact et pression ne sont pas des solides',
+    '{count} facets of the mesh are not in the model': '{count} facettes du maillage ne sont pas dans le modèle',
+    '{name} is no pressure: its component is PRES': "{name} n'est pas une pression : sa composante est PRES",
+    'this model holds no surface under pressure': 'ce modèle ne contient pas de surface sous pression',
+    "MODE G 'CHARGEMENT' 'PRESSION' makes one; PRES 'MASS' loads a solid": "MODE G 'CHARGEMENT' 'PRESSION' en fait une ; PRES 'MASS' charge un solide",
 }
