@@ -201,7 +201,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "PROI": ("gibiane_ops.fields.transfer",),
     # smoothing, error, sizes
     "LISSER": ("gibiane_ops.smoothing",),
-    "TAILLE": ("gibiane_ops.sizes",),
+    "TAILLE": ("gibiane_ops.sizes", "gibiane_ops.adapting"),
     # pictures and files
     "DEFORME": ("gibiane_ops.output.shapes",),
     "VECTEUR": ("gibiane_ops.output.shapes",),

@@ -12,6 +12,7 @@ from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTMOTS, MAILLAGE, MMODEL, MOT, POINT, RIGIDITE
+from gibiane_ops.kernels.adapt.hanging import hanging_nodes
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.mesh.hosts import hosted
 from gibiane_ops.kernels.rigid import dependent_motion
@@ -36,7 +37,9 @@ RELA = operator(
     "relation, whose coefficients are the values of the field. 'ENSE' m G: the unknown m is the same on all of G. "
     "'CORI' 'DEPL' G: G moves as a rigid body. 'MILI' (names) G: nodes in the middle of edges follow the ends. "
     "G1 'ACCRO' G2 (names) (tol): each node of G1 that an element of G2 holds moves with it. G1 'GLISSANT' G2 (tol): "
-    "likewise, but free to slide along the line G1.",
+    "likewise, but free to slide along the line G1. `RELA MODL`: displacements stay continuous where elements of the "
+    "model are smaller than their neighbours (nodes in the middle of an edge or of a face, REMAILLER 'LOCA') or of "
+    "second degree beside linear ones; no relation where there is none.",
     example="OPTI DIME 2 ELEM QUA4 ; L = DROI 2 (0 0) (1 0) ; S = L TRAN 2 (0 1) ;\n"
     "R = RELA 'UX' L - 'UX' (S COTE 3) ; LIST 'RESU' R ;\n"
     "LIST 'RESU' (RELA 'ENSE' 'UY' (S COTE 3)) ;",
@@ -131,6 +134,27 @@ def _mili(ctx: Context, q: Operands) -> Any:
     for name in names:
         terms = [(row, middle, name, np.ones(n)), (row, ends[:, 0], name, -half), (row, ends[:, 1], name, -half)]
         parts += rows_of(ctx, node_store(ctx).coords[middle], terms, f"RELA MILI {name}").parts
+    return Rigidite(parts)
+
+
+@RELA.form(Arg("model", MMODEL, "model"), gives=[RIGIDITE])
+def _continuous(ctx: Context, model: Modele) -> Rigidite:
+    """Tie the nodes in the middle of edges and faces of larger or linear elements; masters may hang in their turn."""
+    store = node_store(ctx)
+    blocks = [(zone.shape, zone.cells) for zone in model.zones]
+    nodes, masters = hanging_nodes(store.coords, blocks)
+    used = masters >= 0
+    row = np.repeat(np.arange(len(nodes)), used.sum(axis=1))
+    share = np.repeat(1.0 / used.sum(axis=1), used.sum(axis=1))
+    if not len(nodes):
+        return Rigidite([])
+    parts = []
+    for name in _names(ctx, None):
+        terms: list[Any] = [
+            (np.arange(len(nodes)), nodes, name, np.ones(len(nodes))),
+            (row, masters[used], name, -share),
+        ]
+        parts += rows_of(ctx, store.coords[nodes], terms, f"RELA MODL {name}").parts
     return Rigidite(parts)
 
 
@@ -246,11 +270,6 @@ def _field(ctx: Context, field: ChPoint, sense: str | None, dual: ChPoint | None
         ctx.fail(26, "all coefficients of the relation are zero", at="field")
     centre = node_store(ctx).coords[np.unique(np.concatenate([t[1] for t in terms]))].mean(axis=0)
     return rows_of(ctx, centre[None], terms, "RELA CHPOINT", SENSES.get(sense or "", "="))
-
-
-@RELA.form(Arg("model", MMODEL, "model"), gives=[RIGIDITE])
-def _model(ctx: Context, model: Modele) -> Rigidite:
-    return Rigidite([])
 
 
 @RELA.stream(

@@ -11,27 +11,31 @@ from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.adapt.diameters import smallest_lengths
-from gibiane_ops.kernels.adapt.sizes import singular_orders, size_map
+from gibiane_ops.kernels.adapt.orders import fitted_orders, singular_orders
+from gibiane_ops.kernels.adapt.sizes import size_map
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.algebra import SCAL
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
 from gibiane_ops.values.failures import worded
-from gibiane_ops.values.material import MATERIAL, on_zone, solid_zones
-from gibiane_ops.values.modele import Modele, ModelZone
-from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+from gibiane_ops.values.material import MATERIAL, solid_zones
+from gibiane_ops.values.modele import Modele
+from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.results import wanted_results
+from gibiane_ops.values.sizing import coincident, error_map, prescribed
 
 TAIL = operator(
     "TAILLE",
     topic="adaptation",
     summary="sizes of elements: present ones, or those of the next mesh",
-    notice="`CH = TAILLE 'DIAMETRE_MIN' MODL`: the smallest length of each element (component L). "
-    "`CHD = TAILLE 'ERREUR' CARTE MODL 'PREC' e0`: the sizes at the nodes of the coarsest mesh expected to have the "
-    "relative error e0, from a map of relative errors (ERREUR; its component TOTA, or its only one). 'ORDRE' p is the "
-    "order of convergence (if absent 1 for linear elements, 2 for quadratic ones), 'SING' lowers it where the error "
-    "peaks; 'MINI' and 'MAXI' bound the sizes, 'GRAD' their growth (1.5), 'NBMA' the number of elements; 'MINN' takes "
-    "at a node the smallest size around it rather than their geometric mean. `CHD NB = TAILLE ...` also gives the "
-    "number of elements that the sizes ask for. Nodes at one place in two solids (contact) get one size.",
+    notice="`CH = TAILLE 'DIAMETRE_MIN' MODL`: the smallest length of each element (component L). `CHD = TAILLE "
+    "'ERREUR' CARTE MODL 'PREC' e0`: the sizes at the nodes of the coarsest mesh expected to have the relative error "
+    "e0, from a map of relative errors (ERREUR; its component TOTA, or its only one). 'ORDRE' p is the order of "
+    "convergence (if absent 1 for linear elements, 2 for quadratic ones), 'SING' lowers it to 0.5 where the error "
+    "peaks, 'AJUS' to what the error around shows; the fewest elements are sought, with 'EGAL' (which implies 'SING') "
+    "equal errors of all elements; 'MINI' and 'MAXI' bound the sizes, 'GRAD' their growth (1.5), 'NBMA' the number of "
+    "elements; 'MINN' takes at a node the smallest size around it rather than their geometric mean. `CHD NB = TAILLE "
+    "...` also gives the number of elements that the sizes ask for. Nodes at one place in two solids (contact) get "
+    "one size.",
     example="""
     OPTI DIME 3 ELEM CUB8 ;
     S = (DROI 1 (0. 0. 0.) (1. 0. 0.)) TRAN 1 (0. 1. 0.) ; V = S VOLU 2 'TRAN' (0. 0. 1.) ;
@@ -57,34 +61,15 @@ def _smallest(ctx: Context, diameter: bool, model: Modele, cara: MChaml | None) 
     return MChaml(zones, MATERIAL, "GRAVITE")
 
 
-def _errors(ctx: Context, field: MChaml, zones: list[ModelZone]) -> FloatArray:
-    name = "TOTA" if "TOTA" in field.names else field.names[0] if len(field.names) == 1 else None
-    if name is None:
-        ctx.fail(
-            236,
-            "the map has neither one component nor a component TOTA; it has {known}",
-            at="carte",
-            known=" ".join(field.names) or "none",
-        )
-    return np.concatenate([on_zone(ctx, field, z, "carte").component(name).mean(axis=1) for z in zones])
-
-
-def _same_place(points: FloatArray) -> IntArray | None:
-    """Return the pairs of nodes at one place (the two sides of a contact), or None."""
-    from scipy.spatial import cKDTree
-
-    reach = 1e-9 * float(np.ptp(points, axis=0).max())
-    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-    return pairs.astype(np.int64) if len(pairs) else None
-
-
 @TAIL.form(
     Key("ERREUR", "sizes for a prescribed error", required=True),
     Arg("carte", MCHAML, "map of relative errors"),
     Arg("model", MMODEL, "model"),
     Key("PREC", "prescribed relative error (needed)", Arg("e0", FLOTTANT)),
     Key("ORDRE", "order of convergence", Arg("p", FLOTTANT)),
-    Key("SING", "lower order where the error peaks"),
+    Key("SING", "order 0.5 where the error peaks"),
+    Key("AJUSTE", "order fitted where the error peaks", name="fit"),
+    Key("EGAL", "equal errors of all elements, not the fewest elements", name="equal"),
     Key("MINI", "smallest size", Arg("h1", FLOTTANT)),
     Key("MAXI", "largest size", Arg("h2", FLOTTANT)),
     Key("GRAD", "growth of sizes from a node to the next", Arg("g", FLOTTANT)),
@@ -100,48 +85,45 @@ def _wanted(
     prec: float | None,
     ordre: float | None,
     sing: bool,
+    fit: bool,
+    equal: bool,
     mini: float | None,
     maxi: float | None,
     grad: float | None,
     nbma: float | None,
     minn: bool,
 ) -> Any:
-    if prec is None:
-        ctx.fail(7, "the prescribed error is missing", hint="'PREC' 0.05 for 5 percent")
-    if not prec > 0:
-        ctx.fail(
-            41,
-            "the prescribed error is {value}: it must be above 0",
-            at="prec",
-            value=prec,
-            hint="a relative error, e.g. 'PREC' 0.05 for 5 percent",
-        )
+    prec = prescribed(ctx, prec)
     store = node_store(ctx)
     zones = solid_zones(ctx, model)
-    error = _errors(ctx, carte, zones)
+    error = error_map(ctx, carte, zones)
     nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
     points = store.coords[nodes][:, : zones[0].dim]
     blocks = [(z.shape, np.searchsorted(nodes, z.cells)) for z in zones]
     degrees = np.concatenate([np.full(len(z.cells), float(shape(z.shape).degree)) for z in zones])
     order: float | FloatArray = ordre if ordre is not None else degrees if np.ptp(degrees) else float(degrees[0])
     with worded(ctx, at="prec"):
-        if sing:
+        if sing or fit or equal:
             measures = np.concatenate([geometry.measures(shape(n), points[c]) for n, c in blocks])
             # Peaks of linear solid elements are sharper than those of plane or quadratic ones.
             beta = 3.0 if zones[0].dim == 3 and degrees.max() == 1 else 2.0
-            order = singular_orders(len(points), blocks, error**2, measures, order, beta=beta)
+            if fit:
+                order = fitted_orders(points, blocks, error**2, measures, order, beta=beta)[0]
+            else:
+                order = singular_orders(len(points), blocks, error**2, measures, order, beta=beta)
         found = size_map(
             points,
             blocks,
             error,
             prec,
             order=order,
+            equal=equal,
             smallest=mini or 0.0,
             largest=np.inf if maxi is None else maxi,
             growth=1.5 if grad is None else grad,
             max_count=nbma,
             smallest_of_star=minn,
-            pairs=_same_place(points),
+            pairs=coincident(points),
         )
     if nbma is not None and found.optimum > nbma:
         reachable = prec * (found.optimum / nbma) ** (float(np.mean(order)) / zones[0].dim)

@@ -5,7 +5,8 @@ import pytest
 import scipy.sparse as sp
 
 from gibiane_ops.kernels import recovery
-from gibiane_ops.kernels.adapt.sizes import singular_orders, size_map
+from gibiane_ops.kernels.adapt.orders import singular_orders
+from gibiane_ops.kernels.adapt.sizes import size_map
 from gibiane_ops.kernels.assembly import (
     assemble,
     assemble_vector,

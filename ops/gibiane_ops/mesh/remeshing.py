@@ -2,38 +2,41 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, TABLE, Table, type_of
+from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, TABLE, Table
 from gibiane_ops.kernels import topology
-from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.errors import MeshingFailed
 from gibiane_ops.kernels.mesh import unions
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
 from gibiane_ops.mesh.filling import fill_contour, fill_envelope, sizes_at
-from gibiane_ops.values.champs import ChPoint
-from gibiane_ops.values.maillage import Maillage, Point
-
-SIMPLEX = {1: "POI1", 2: "SEG2", 3: "TRI3", 4: "TET4"}
+from gibiane_ops.mesh.groups import Groups
+from gibiane_ops.mesh.local import divide, move_nodes
+from gibiane_ops.values.champs import ChPoint, MChaml
+from gibiane_ops.values.maillage import Maillage
 
 REMA = operator(
     "REMAILLER",
     topic="mesh",
     summary="new mesh of the same domain with other sizes",
     notice="`M2 = REMAILLER M1 size` meshes the domain of M1 (TET4 in space, TRI3 in the plane) again; size is a "
-    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse). Corners, "
-    "plane faces and straight edges are kept exactly, curved faces follow the old facets. "
-    "`M2 T2 = REMAILLER M1 size 'GROU' T1`: the MAILLAGE in the table T1 (parts of M1, of its boundary, of "
-    "edges, points) are found again on M2 under the same indices. Index PAIRES of T1, a table of tables "
-    "(1: face of the second body, 2: face of the first), names contact faces that are meshed once and "
-    "duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning and M1 is returned. "
-    "`M2 = REMAILLER M1 BORD size` keeps the whole boundary BORD (ENVE M1, CONT M1) as it is, node for node. Meshes "
-    "of second degree get mid-nodes again; on the boundary they are those of new straight edges, unless it is kept.",
+    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse). Corners, plane faces and "
+    "straight edges are kept exactly, curved faces follow the old facets. `M2 T2 = REMAILLER M1 size 'GROU' T1`: the "
+    "MAILLAGE in the table T1 (parts of M1, of its boundary, of edges, points) are found again on M2 under the same "
+    "indices. Index PAIRES of T1, a table of tables (1: face of the second body, 2: face of the first), names contact "
+    "faces that are meshed once and duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning "
+    "and M1 is returned. `M2 = REMAILLER M1 BORD size` keeps the whole boundary BORD (ENVE M1, CONT M1) as it is, "
+    "node for node. 'LOCA' divides elements in place and puts them together again where the sizes allow: TRI3 and "
+    "TET4 are halved, without hanging nodes; QUA4 and CUB8 are cut in 4 or 8, and RELA MODL holds their hanging "
+    "nodes. Contact pairs are divided alike (QUA4, CUB8: all the elements of a contact). The table given back holds "
+    "under ARBRE what coarsening needs. `M2 T2 = REMAILLER M1 MARQ 'GROU' T1`, also with a size and 'LOCA': elements "
+    "where the field MARQ exceeds 0.5 become quadratic, those of a contact stay linear; RELA MODL ties the mid-nodes "
+    "beside linear elements. `M2 T2 = REMAILLER M1 'DEPL' V 'GROU' T1`: the same elements on new nodes, moved by the "
+    "field V. Meshes of second degree get mid-nodes again; on the boundary they are those of new straight edges, "
+    "unless it is kept.",
     example="OPTI DIME 2 ELEM TRI3 ; C = CERC 16 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; S = SURF C 'PLAN' ; "
     "S2 = REMAILLER S 0.1 ; MESS ((NBEL S2) > (NBEL S)) ;",
     see=["MAILLER", "TAILLE"],
@@ -41,107 +44,6 @@ REMA = operator(
 
 SIZE = Arg("size", (FLOTTANT, CHPOINT), "edge length, or field of sizes")
 SOUC = Key("SOUCI", "a failure is a warning")
-
-
-class Groups:
-    """The groups of a table as kernels take them: names and elements by ranks of nodes.
-
-    A contact face that is not one of the groups is added under a name of its own.
-    """
-
-    def __init__(self, ctx: Context, table: Table, nodes: IntArray) -> None:
-        self.ctx = ctx
-        self.nodes = nodes
-        self.keys: dict[str, Any] = {}
-        self.cells: dict[str, IntArray] = {}
-        self.points: set[str] = set()
-        self.quadratic: set[str] = set()
-        self.pairs: list[tuple[str, str]] = []
-        self.pair_keys: list[Any] = []
-        values: dict[int, str] = {}
-        for index, value in table.entries.values():
-            if index in ("PAIRES", "SOUSTYPE"):
-                continue
-            name = f"{len(self.keys)}"
-            self._add(name, index, value)
-            values[id(value)] = name
-        if table.has("PAIRES"):
-            self._read_pairs(table.get("PAIRES"), values)
-
-    def _add(self, name: str, index: Any, value: Any) -> None:
-        if isinstance(value, Point):
-            self.points.add(name)
-            cells = np.array([[value.node]])
-        elif isinstance(value, Maillage):
-            if is_quadratic(value):
-                self.quadratic.add(name)
-            block = linear_mesh(self.ctx, value).single()
-            if block is None or block.shape not in SIMPLEX.values():
-                self.ctx.fail(
-                    16,
-                    "the group {index} holds {shapes}: one of POI1, SEG2, TRI3, TET4 is wanted",
-                    at="grou",
-                    index=index,
-                    shapes=" ".join(value.shapes) or "no element",
-                )
-            cells = block.cells
-        else:
-            self.ctx.fail(
-                39, "the group {index} is a {type}, not a MAILLAGE", at="grou", index=index, type=type_of(value)
-            )
-        place = np.searchsorted(self.nodes, cells)
-        place[place == len(self.nodes)] = 0
-        if (self.nodes[place] != cells).any():
-            self.ctx.fail(
-                21,
-                "the group {index} is not a part of the mesh: {count} of its nodes are elsewhere",
-                at="grou",
-                index=index,
-                count=len(np.setdiff1d(cells, self.nodes)),
-                hint="a group made of other nodes at the same places is another mesh: ELIM makes them one",
-            )
-        self.keys[name] = index
-        self.cells[name] = place
-
-    def _read_pairs(self, pairs: Any, values: dict[int, str]) -> None:
-        if not isinstance(pairs, Table):
-            self.ctx.fail(37, "PAIRES is a {type}: a TABLE of TABLE is wanted", at="grou", type=type_of(pairs))
-        for index, pair in pairs.entries.values():
-            names = []
-            for side in (1, 2):
-                face = pair.get(side) if isinstance(pair, Table) and pair.has(side) else None
-                if not isinstance(face, Maillage):
-                    self.ctx.fail(
-                        37, "the pair {index} has no MAILLAGE at index {side}", at="grou", index=index, side=side
-                    )
-                if id(face) not in values:
-                    name = values[id(face)] = f"pair {index} {side}"
-                    self._add(name, name, face)
-                names.append(values[id(face)])
-            self.pairs.append((names[0], names[1]))
-            self.pair_keys.append(index)
-
-    def renewed(self, groups: dict[str, IntArray], ids: IntArray) -> Table:
-        """Return the table of the same groups on the new nodes."""
-        table = Table()
-        made: dict[str, Maillage] = {}
-        for name, cells in groups.items():
-            group = new_mesh(self.ctx, [(SIMPLEX[cells.shape[1]], ids[cells])])
-            made[name] = finished(self.ctx, group, name in self.quadratic)
-        for name, index in self.keys.items():
-            if name.startswith("pair"):
-                continue
-            group = made[name]
-            table.set(index, Point(group.store, int(group.nodes[0])) if name in self.points else group)
-        if self.pairs:
-            pairs = Table()
-            for index, (first, second) in zip(self.pair_keys, self.pairs, strict=True):
-                pair = Table()
-                pair.set(1, made[first])
-                pair.set(2, made[second])
-                pairs.set(index, pair)
-            table.set("PAIRES", pairs)
-        return table
 
 
 def _remesh(
@@ -194,10 +96,37 @@ def _remesh(
     SIZE,
     Key("GROUPES", "table of groups", Arg("t", TABLE), required=True, name="grou"),
     SOUC,
+    Key("LOCAL", "elements divided and put together in place"),
+    Arg("marks", MCHAML, "elements of second degree (above 0.5), with 'LOCA'", optional=True),
     gives=[MAILLAGE, TABLE],
 )
-def _with_groups(ctx: Context, g: Maillage, size: float | ChPoint, grou: Table, souci: bool) -> tuple[Maillage, Table]:
+def _with_groups(
+    ctx: Context, g: Maillage, size: float | ChPoint, grou: Table, souci: bool, local: bool, marks: MChaml | None
+) -> tuple[Maillage, Table]:
+    if local:
+        return divide(ctx, g, size, grou, marks)
     return _remesh(ctx, g, size, grou, souci)
+
+
+@REMA.form(
+    Arg("g", MAILLAGE, "mesh"),
+    Arg("marks", MCHAML, "elements of second degree (above 0.5)"),
+    Key("GROUPES", "table of groups", Arg("t", TABLE), required=True, name="grou"),
+    gives=[MAILLAGE, TABLE],
+)
+def _raised(ctx: Context, g: Maillage, marks: MChaml, grou: Table) -> tuple[Maillage, Table]:
+    return divide(ctx, g, None, grou, marks)
+
+
+@REMA.form(
+    Arg("g", MAILLAGE, "mesh"),
+    Key("DEPLACER", "the same elements on moved nodes", required=True, name="moved"),
+    Arg("move", CHPOINT, "moves of the nodes (UX UY UZ)"),
+    Key("GROUPES", "table of groups", Arg("t", TABLE), required=True, name="grou"),
+    gives=[MAILLAGE, TABLE],
+)
+def _moved(ctx: Context, g: Maillage, moved: bool, move: ChPoint, grou: Table) -> tuple[Maillage, Table]:
+    return move_nodes(ctx, g, move, grou)
 
 
 @REMA.form(Arg("g", MAILLAGE, "mesh"), Arg("bord", MAILLAGE, "its boundary, to be kept"), SIZE, gives=[MAILLAGE])

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from gibiane_ops.kernels.adapt import orders as orders_of
 from gibiane_ops.kernels.adapt import sizes
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
@@ -133,7 +134,7 @@ def test_singular_nodes_lower_the_order_around_them():
     error2 = np.where(near, 1.0, 1e-6)  # the first cube carries nearly all the error
 
     def orders(error2, **more):
-        return sizes.singular_orders(len(points), blocks, error2, np.full(60, 1 / 6), 1.0, **more)
+        return orders_of.singular_orders(len(points), blocks, error2, np.full(60, 1 / 6), 1.0, **more)
 
     assert (orders(error2)[near] == 0.5).all()
     assert (orders(error2)[(cells >= 12).all(axis=1)] == 1.0).all()
@@ -165,3 +166,45 @@ def test_mid_nodes_take_the_mean_of_their_edge():
         np.testing.assert_allclose(found.nodal[:5], linear.nodal, rtol=1e-12)
         np.testing.assert_allclose(found.nodal[5:], found.nodal[unique].mean(axis=1), rtol=1e-12)
         assert found.count == pytest.approx(linear.count, rel=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [0.4, 0.5445, 0.75])
+def test_the_order_of_a_singularity_is_read_from_the_error_around_it(exponent):
+    n = 16
+    line = np.linspace(0, 1, n + 1)
+    points = np.stack(np.meshgrid(line, line, indexing="ij"), -1).reshape(-1, 2)
+    index = np.arange((n + 1) ** 2).reshape(n + 1, n + 1)
+    cells = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], -1).reshape(-1, 4)
+    area = np.full(len(cells), 1 / n**2)
+    r = np.linalg.norm(points[cells].mean(axis=1), axis=1)
+    error2 = area * (1 / n) ** 2 * r ** (2 * (exponent - 2))
+    orders, found = orders_of.fitted_orders(points, [("QUA4", cells)], error2, area, 1.0, beta=5.0)
+    assert len(found) == 1
+    assert found[0] == pytest.approx(exponent, abs=0.05)
+    assert orders[0] == found[0]
+    assert orders[-1] == 1.0
+
+
+def test_an_even_error_has_no_singularity():
+    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    cells = np.array([[0, 1, 2], [0, 2, 3]])
+    orders, found = orders_of.fitted_orders(points, [("TRI3", cells)], np.full(2, 0.1), np.full(2, 0.5), 1.0)
+    assert found == []
+    assert (orders == 1.0).all()
+
+
+def test_equal_errors_are_equal_and_take_more_elements_where_orders_differ():
+    rng = np.random.default_rng(4)
+    error2 = rng.uniform(0.1, 1, 40)
+    orders = np.where(np.arange(40) < 8, 0.5, 1.0)
+    fewest = sizes.ratios_by_order(error2, 0.5, orders, 2)
+    equal = sizes.ratios_by_order(error2, 0.5, orders, 2, equal=True)
+    for ratios in (fewest, equal):
+        assert (ratios ** (2 * orders) * error2).sum() == pytest.approx(0.25, rel=1e-12)
+    each = equal ** (2 * orders + 2) * error2  # error of a new element: r^d of them share what an old one keeps
+    assert np.ptp(each) <= 1e-12 * each.max()
+    assert (equal**-2.0).sum() > (fewest**-2.0).sum()
+    same = np.full(40, 1.0)
+    assert np.allclose(
+        sizes.ratios_by_order(error2, 0.5, same, 2, equal=True), sizes.ratios_by_order(error2, 0.5, same, 2)
+    )

@@ -20,9 +20,6 @@ REGULAR: dict[str, float] = {"TRI3": 4 / np.sqrt(3), "TET4": 6 * np.sqrt(2)}
 FLOOR = 1e-12
 """Smallest squared error of an element, in units of the mean: an element without error still has a size."""
 
-SINGULAR_ORDER = 0.5
-"""Order of convergence taken beside a singular node: displacement in the square root of the distance."""
-
 
 def element_sizes(of: Shape, measures: FloatArray) -> FloatArray:
     """Give the edge of the regular element of the same measure.
@@ -72,7 +69,9 @@ def uniform_order_ratios(error2: FloatArray, target: float, order: float, dim: i
     return np.asarray(target ** (1 / order) / (e2**power * (e2 ** (dim * power)).sum() ** (1 / (2 * order))))
 
 
-def ratios_by_order(error2: FloatArray, target: float, orders: FloatArray, dim: int) -> FloatArray:
+def ratios_by_order(
+    error2: FloatArray, target: float, orders: FloatArray, dim: int, *, equal: bool = False
+) -> FloatArray:
     """Find the ratios of sizes, new over old, when each element has its own order of convergence.
 
     Parameters
@@ -82,6 +81,9 @@ def ratios_by_order(error2: FloatArray, target: float, orders: FloatArray, dim: 
     orders : (m,) float64
         Positive.
     dim : int
+    equal : bool
+        Ask for one error on all new elements instead of the fewest elements: q_E goes from under the fraction. The two
+        agree where the orders are the same.
 
     Returns
     -------
@@ -99,11 +101,11 @@ def ratios_by_order(error2: FloatArray, target: float, orders: FloatArray, dim: 
 
     Source
     ------
-    Coorevits, Ladeveze and Pelle 1994 (orders by element near singularities).
+    Coorevits, Ladeveze and Pelle 1994 (orders by element near singularities); the thesis, (2.68) and (2.69).
     """
     e2 = _floored(error2)
     power = 1 / (2 * orders + dim)
-    log_ratio = power * (np.log(dim / (2 * orders)) - np.log(e2))  # with A = 1
+    log_ratio = power * (np.log(dim / (2 * (1.0 if equal else orders))) - np.log(e2))  # with A = 1
     log_A, history = 0.0, []
     for _ in range(100):
         terms = 2 * orders * (log_ratio - power * log_A) + np.log(e2)
@@ -122,54 +124,6 @@ def ratios_by_order(error2: FloatArray, target: float, orders: FloatArray, dim: 
 def _floored(error2: FloatArray) -> FloatArray:
     """Replace vanishing errors by a tiny share of the mean."""
     return np.asarray(np.maximum(error2, FLOOR * error2.mean()), np.float64)
-
-
-def singular_orders(
-    n_points: int,
-    blocks: Sequence[Block],
-    error2: FloatArray,
-    measures: FloatArray,
-    order: float | FloatArray,
-    *,
-    singular: float = SINGULAR_ORDER,
-    beta: float = 3.0,
-) -> FloatArray:
-    """Give each element its order of convergence, lower where the error peaks.
-
-    Parameters
-    ----------
-    n_points : int
-    blocks : list of (str, (m, n_nodes) int64)
-    error2, measures : (n_cells,) float64
-        Squared error and measure of each cell, through the blocks.
-    order : float or (n_cells,) float64
-        Order away from singularities.
-    singular : float
-        Order of the elements that touch a singular node.
-    beta : float
-        A node is singular when its error density is at least beta times that of the whole; 3 for linear solid
-        elements, 2 for plane or second-order ones.
-
-    Returns
-    -------
-    (n_cells,) float64
-
-    Notes
-    -----
-    Error density: root of the sum of squared errors over the sum of measures, of the cells of a node or of all cells.
-
-    Source
-    ------
-    Coorevits, Ladeveze and Pelle 1994.
-    """
-    indptr, cells = topology.node_to_cells(blocks, n_points)
-    used = np.flatnonzero(np.diff(indptr))
-    density2 = np.zeros(n_points)
-    density2[used] = np.add.reduceat(error2[cells], indptr[used]) / np.add.reduceat(measures[cells], indptr[used])
-    whole = float(error2.sum() / measures.sum())
-    peak = (density2 >= beta**2 * whole) & (whole > 0)
-    touched = np.concatenate([peak[each].any(axis=1) for _, each in blocks])
-    return np.where(touched, np.minimum(singular, order), order)
 
 
 def nodal_sizes(
@@ -304,6 +258,7 @@ def size_map(
     target: float,
     *,
     order: float | FloatArray = 1.0,
+    equal: bool = False,
     smallest: float = 0.0,
     largest: float = np.inf,
     growth: float | None = 1.5,
@@ -324,6 +279,8 @@ def size_map(
         Prescribed error of the whole.
     order : float or (n_cells,) float64
         Order of convergence, one for all or one per cell.
+    equal : bool
+        See `ratios_by_order`.
     smallest, largest : float, length
         Bounds of the sizes.
     growth : float, optional
@@ -369,7 +326,7 @@ def size_map(
     elif orders.ndim == 0:
         ratios = uniform_order_ratios(error2, target, float(orders), dim)
     else:
-        ratios = ratios_by_order(error2, target, orders, dim)
+        ratios = ratios_by_order(error2, target, orders, dim, equal=equal)
     optimum = float((ratios**-dim).sum())
     nodal = nodal_sizes(len(points), blocks, ratios * old, smallest_of_star=smallest_of_star, pairs=pairs)
     nodal *= (predicted_count(points, blocks, nodal) / optimum) ** (1 / dim)

@@ -13,6 +13,7 @@ from gibiane_ops.kernels.adapt.sizes import predicted_count
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
+from gibiane_ops.kernels.mesh import pairing
 from gibiane_ops.kernels.remesh.carry import Contact, OldMesh, carry
 from gibiane_ops.kernels.remesh.generate import RawMesh, generate
 from gibiane_ops.kernels.remesh.skeleton import CELL, Skeleton, build_skeleton, membership, regions
@@ -24,8 +25,6 @@ AIM, LOWEST = 0.98, 0.95
 """The number of elements aimed at, and the least accepted, as shares of the number asked (never exceeded)."""
 
 TRIALS = 5
-PAIR_TOLERANCE = 1e-7
-"""Largest distance of the two nodes of a pair, as a share of the size of the mesh."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +120,8 @@ def remesh(
         raise BadValue("size", float(nodal[used].min()), "finite and positive")
 
     solid = topology.solids([(CELL[dim], cells)], len(points))[1]
-    merged, contacts = _merge_pairs(points, solid, named, pairs)
+    merged, owners = pairing.merged_nodes(points, solid, named, pairs)
+    contacts = [Contact(*names, both) for names, both in zip(pairs, owners, strict=True)]
     common = np.exp(_group_mean(np.log(np.where(np.isfinite(nodal), nodal, 1.0)), merged, used))
     by_dim = {k: {n: g for n, g in named.items() if g.shape[1] == k + 1} for k in range(dim + 1)}
     region = regions(cells, membership(cells, by_dim[dim]))
@@ -143,38 +143,11 @@ def remesh(
         wanted = float(count)
     raw, counts = _mesh_to_count(skeleton, new_cells, common, wanted)
     volumes = geometry.measures(shape(CELL[dim]), raw.points[raw.cells][:, :, :dim])
-    _check_measures(skeleton, geometry.measures(shape(CELL[dim]), points[cells]), np.abs(volumes))
+    _check_measures(skeleton, np.abs(geometry.measures(shape(CELL[dim]), points[cells])), np.abs(volumes))
     turned = np.where((volumes < 0)[:, None], raw.cells[:, [1, 0, *range(2, dim + 1)]], raw.cells)
     old = OldMesh(cells, region, solid, merged, named, contacts)
     new = carry(old, skeleton, replace(raw, cells=turned))
     return Remeshed(raw.points[new.source][:, :dim], new.cells, new.groups, new.pairs, wanted, counts)
-
-
-def _merge_pairs(
-    points: FloatArray, solid: IntArray, groups: Mapping[str, IntArray], pairs: Sequence[tuple[str, str]]
-) -> tuple[IntArray, list[Contact]]:
-    """Give the nodes of each first face the numbers of those of the second."""
-    from scipy.spatial import cKDTree
-
-    merged = np.arange(len(points))
-    contacts = []
-    for first, second in pairs:
-        for name in (first, second):
-            if name not in groups or groups[name].shape[1] != points.shape[1]:
-                raise BadValue("pair", name, "the name of a group of facets")
-        a, b = np.unique(groups[first]), np.unique(groups[second])
-        distance, nearest = cKDTree(points[b]).query(points[a])
-        limit = PAIR_TOLERANCE * float(np.ptp(points, axis=0).max())
-        if len(a) != len(b) or len(np.unique(nearest)) != len(a) or distance.max() > limit:
-            raise BadValue(f"pair {first}, {second}", float(distance.max()), "two faces with nodes at the same places")
-        owner = np.unique(solid[a])
-        if len(owner) != 1 or owner[0] in solid[b]:
-            raise BadValue(f"pair {first}, {second}", "one solid on both sides", "faces of two different solids")
-        merged[a] = merged[b[nearest]]
-        contacts.append(Contact(first, second, (int(owner[0]), int(solid[b[0]]))))
-    while (merged[merged] != merged).any():  # a node in several contacts
-        merged = merged[merged]
-    return merged, contacts
 
 
 def _group_mean(values: FloatArray, group: IntArray, members: IntArray) -> FloatArray:
