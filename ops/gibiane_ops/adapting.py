@@ -71,7 +71,7 @@ def _degrees(
             dim=dim,
             may_halve=not seul,
         )
-    wanted = np.where(found.halved, size / 2, size)
+    wanted = size * 0.5**found.halvings
     nodal = np.full(len(points), np.inf)
     start = 0
     marks = []

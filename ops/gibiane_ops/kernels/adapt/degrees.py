@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels import geometry, topology
-from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.topology import Block
 
@@ -21,6 +21,12 @@ ADDED = {"TRI3": 3.0, "QUA4": 2.0, "TET4": 7.0, "CUB8": 3.0}
 LAYERS = 2
 """Layers of elements around a singular node that stay linear."""
 
+MOST_HALVINGS = 3
+"""How many times the size of an element is halved at once: further predictions mean little."""
+
+ENOUGH = 0.8
+"""Share of the possible gain that is taken when the target is out of reach of one change of the mesh."""
+
 SLACK = 0.2
 """How far below the degree the order of an element may be for its degree to be raised."""
 
@@ -31,14 +37,16 @@ class Plan:
 
     Attributes
     ----------
-    raised, halved : (m,) bool
-        Elements whose degree goes up, and those that are divided.
+    raised : (m,) bool
+        Elements whose degree goes up.
+    halvings : (m,) int64
+        How many times the size of an element is halved.
     predicted : float
         Error of the whole expected then.
     """
 
     raised: BoolArray
-    halved: BoolArray
+    halvings: IntArray
     predicted: float
 
 
@@ -147,20 +155,32 @@ def plan(
 
     Notes
     -----
-    Dividing leaves ``e^2 2^(-2q)``, raising ``e^2 (h/L)^2``; the gain is divided by the unknowns added.
+    Halving leaves ``e^2 2^(-2q)`` and each further time that share again, at 2^dim times the unknowns; raising leaves
+    ``e^2 (h/L)^2``; gains are divided by the unknowns added. When all that may be done does not meet the target, the
+    most profitable part of it is done that brings `ENOUGH` of its gain.
     """
+    split = 2.0**dim
     left_h = 2.0 ** (-2 * order)
     left_p = np.where(may_rise, np.minimum(ratio**2, 1.0), 1.0)
-    gain_h = error2 * (1 - left_h) / (2**dim - 1) if may_halve else np.zeros_like(error2)
-    gain_p = error2 * (1 - left_p) / added
-    rise = gain_p > gain_h
-    best = np.where(rise, gain_p, gain_h)
-    left = error2 * np.where(rise, left_p, left_h if may_halve else 1.0)
-    ranked = np.argsort(-best, kind="stable")
-    ranked = ranked[best[ranked] > 0]
-    expected = error2.sum() - np.cumsum((error2 - left)[ranked])
-    enough = int(np.searchsorted(-expected, -(target**2))) + 1
-    chosen = np.zeros(len(error2), bool)
-    chosen[ranked[:enough]] = error2.sum() > target**2
-    remaining = float(np.where(chosen, left, error2).sum())
-    return Plan(chosen & rise, chosen & ~rise, float(np.sqrt(remaining)))
+    times = np.arange(MOST_HALVINGS if may_halve else 0)
+    gain_h = error2[:, None] * left_h[:, None] ** times * (1 - left_h[:, None])
+    rate_h = gain_h / ((split - 1) * split**times)
+    gain_p = error2 * (1 - left_p)
+    rate_p = gain_p / added
+    rise = rate_p > rate_h[:, :1].max(axis=1, initial=0.0)
+    gain = np.where(rise[:, None], 0.0, gain_h)
+    rate = np.where(rise[:, None], 0.0, rate_h)
+    gain = np.column_stack([np.where(rise, gain_p, 0.0), gain])
+    rate = np.column_stack([np.where(rise, rate_p, 0.0), rate]).ravel()
+    ranked = np.argsort(-rate, kind="stable")
+    ranked = ranked[rate[ranked] > 0]
+    saved = np.cumsum(gain.ravel()[ranked])
+    needed = error2.sum() - target**2
+    if len(saved) and saved[-1] < needed:
+        needed = ENOUGH * saved[-1]
+    enough = int(np.searchsorted(saved, needed)) + 1 if needed > 0 else 0
+    chosen = np.zeros(gain.size, bool)
+    chosen[ranked[:enough]] = True
+    chosen = chosen.reshape(gain.shape)
+    remaining = max(float(error2.sum() - gain[chosen].sum()), 0.0)
+    return Plan(chosen[:, 0], chosen[:, 1:].sum(axis=1), float(np.sqrt(remaining)))

@@ -223,7 +223,7 @@ def _rows_of(facets: IntArray, group: IntArray) -> np.ndarray:
     return wanted[index[: len(facets)]]
 
 
-def adapted(state: Hierarchy, sizes: FloatArray, *, count: float | None = None) -> tuple[Hierarchy, list[int]]:
+def adapted(state: Hierarchy, sizes: FloatArray, *, counted: bool = True) -> tuple[Hierarchy, list[int]]:
     """Divide and put together elements until they have the sizes asked for.
 
     Parameters
@@ -231,9 +231,9 @@ def adapted(state: Hierarchy, sizes: FloatArray, *, count: float | None = None) 
     state : Hierarchy
     sizes : (n,) float64, length
         Edge wanted at the nodes of ``state.mesh()``.
-    count : float, optional
-        Number of elements wanted; if absent the one that the sizes ask for. All sizes are multiplied by one factor,
-        found by trial, so that the mesh has at most that number, and about `NEAR` of it unless divisions jump over it.
+    counted : bool
+        Multiply all sizes by one factor, found by trial, so that the mesh has at most the number of elements that the
+        sizes ask for, and about `NEAR` of it unless divisions jump over it; else take the sizes as they are.
 
     Returns
     -------
@@ -256,7 +256,10 @@ def adapted(state: Hierarchy, sizes: FloatArray, *, count: float | None = None) 
     np.add.at(common, cells, np.log(sizes[now.cells]))
     np.add.at(number, cells, 1.0)
     asked = np.exp(common / np.maximum(number, 1.0))
-    wanted = predicted_count(points, [(state.name, cells)], asked) if count is None else count
+    if not counted:
+        tree = _resized(state.tree, asked)
+        return replace(state, tree=tree), [_count(tree)]
+    wanted = predicted_count(points, [(state.name, cells)], asked)
     dim = points.shape[1]
     factor, counts = 1.0, []
     best: Bisection | Octree | None = None
@@ -264,7 +267,7 @@ def adapted(state: Hierarchy, sizes: FloatArray, *, count: float | None = None) 
     low, high = 0.0, np.inf
     for _ in range(TRIALS):
         tree = _resized(state.tree, factor * asked)
-        got = len(tree.leaves) if isinstance(tree, Bisection) else len(tree.root)
+        got = _count(tree)
         counts.append(got)
         if best is None or (got <= wanted and (got > best_count or best_count > wanted)) or (got < best_count > wanted):
             best, best_count = tree, got
@@ -275,6 +278,10 @@ def adapted(state: Hierarchy, sizes: FloatArray, *, count: float | None = None) 
         factor = step if low < step < high else float(np.sqrt(low * high)) if np.isfinite(high) and low > 0 else step
     assert best is not None
     return replace(state, tree=best), counts
+
+
+def _count(tree: Bisection | Octree) -> int:
+    return len(tree.leaves) if isinstance(tree, Bisection) else len(tree.root)
 
 
 def _resized(tree: Bisection | Octree, sizes: FloatArray) -> Bisection | Octree:
