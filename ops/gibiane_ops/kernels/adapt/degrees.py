@@ -179,8 +179,8 @@ def plan(
     if len(saved) and saved[-1] < needed:
         needed = ENOUGH * saved[-1]
     enough = int(np.searchsorted(saved, needed)) + 1 if needed > 0 else 0
-    chosen = np.zeros(gain.size, bool)
-    chosen[ranked[:enough]] = True
-    chosen = chosen.reshape(gain.shape)
+    picked = np.zeros(gain.size, bool)
+    picked[ranked[:enough]] = True
+    chosen = picked.reshape(gain.shape)
     remaining = max(float(error2.sum() - gain[chosen].sum()), 0.0)
     return Plan(chosen[:, 0], chosen[:, 1:].sum(axis=1), float(np.sqrt(remaining)))
