@@ -48,7 +48,7 @@ def fill_report(
         "GLISSEMENT": float(report.inner_slip),
         "PUISSANCE": float(max(report.adhesion_power, abs(report.friction_power))),
         "EQUILIBRE": float(report.balance),
-        "EXACT": bool(report.worst <= max(DEPARTURE, 100 * (method.tolerance or 0.0))),
+        "EXACT": bool(converged and report.worst <= max(DEPARTURE, 100 * (method.tolerance or 0.0))),
         "DISSIPATION": float(report.dissipation),
         "KREF": float(interface.kref),
         "ZONES": _zones(interface, state, zones),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -43,7 +43,7 @@ def compare_starts(
     *,
     slip_origin: FloatArray | None = None,
 ) -> Comparison:
-    """Solve again from the tied bodies and from contact without friction, and compare with a solution.
+    """Solve again from the tied bodies, from contact without friction and half-way to what these find, and compare.
 
     Parameters
     ----------
@@ -67,24 +67,29 @@ def compare_starts(
 
     Cost
     ----
-    Three contact solutions on the condensed interface.
+    Three contact solutions on the condensed interface, and one more for each other solution found.
     """
     starts: list[ContactState | None] = [None]
-    others: list[ContactState] = []
     scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
-    worst = 0.0
     try:
         starts.append(solve_coulomb(interface, 0.0))
     except (NotConverged, ContactUnbalanced) as failure:
         if isinstance(failure.best, ContactState):
             starts.append(failure.best)
-    for start in starts:
+    met = [state]
+    worst, place = 0.0, 0
+    while place < len(starts):
+        start = starts[place]
+        place += 1
         try:
             found = solve_coulomb(interface, mu, start=start, slip_origin=slip_origin)
         except (NotConverged, ContactUnbalanced):
             continue
-        difference = float(np.abs(found.r - state.r).max(initial=0)) / scale
-        worst = max(worst, difference)
-        if difference > SAME:
-            others.append(found)
+        differences = [float(np.abs(found.r - other.r).max(initial=0)) / scale for other in met]
+        worst = max(worst, differences[0])
+        if min(differences) > SAME:
+            # between two stable solutions there may be an unstable one
+            starts.append(replace(found, w=(found.w + state.w) / 2, r=(found.r + state.r) / 2))
+            met.append(found)
+    others = met[1:]
     return Comparison(not others, worst, others)

@@ -42,7 +42,8 @@ def draw_scene(
         Extension .png, .svg or .pdf; missing folders are made.
     layers : sequence of Surface, Lines, Dots or Arrows
         Lines, dots and arrows are drawn over the surfaces in this order; surfaces hide one another as in space.
-        When all points have two coordinates the picture is plane, with graduated axes.
+        When all points have two coordinates the picture is plane, with graduated axes; so is that of points of one
+        height seen from above.
     view : (3,) float64, optional
         From the object to the eye; by default from the front (-y), the right (+x) and above (+z). Ignored in the plane.
     scale : Scale, optional
@@ -72,7 +73,7 @@ def draw_scene(
     layers = [layer for layer in layers if len(used(layer))]
     if not layers:
         raise BadValue("picture", "without a point", "at least one point or facet")
-    plane = all(layer.points.shape[1] == 2 for layer in layers)
+    plane = all(layer.points.shape[1] == 2 for layer in layers) or _seen_flat(layers, view)
     direction = np.asarray((0.0, 0.0, 1.0) if plane else DEFAULT_VIEW if view is None else view, np.float64)
     if not np.isfinite(direction).all() or not direction.any():
         raise BadValue("direction of the view", direction.tolist(), "a finite vector that is not zero")
@@ -144,6 +145,16 @@ def _main_axes(figure: Figure, size: tuple[int, int], *, plane: bool, bar: bool,
     else:
         axes.set_axis_off()
     return axes, width, height
+
+
+def _seen_flat(layers: Sequence[Layer], view: Sequence[float] | None) -> bool:
+    """Whether points of one height are seen from straight above."""
+    if view is None or not float(np.hypot(view[0], view[1])) <= 1e-3 * float(view[2]):
+        return False
+    if any(layer.points.shape[1] != 3 for layer in layers):
+        return False
+    heights = np.concatenate([placed(layer)[used(layer), 2] for layer in layers])
+    return float(np.ptp(heights)) == 0.0
 
 
 def _graduate(axes: Axes, seen: FloatArray) -> None:
