@@ -124,7 +124,12 @@ def solve_contact(
     tell_notes(ctx, condensation.factor)
     law = system.friction()
     origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs, law, wishes.history)
-    start = None if wishes.start is None else _start(system, interface, pairs, law, wishes.start)
+    start = None
+    if wishes.start is not None:
+        start = _start(system, interface, pairs, law, wishes.start)
+    elif wishes.history is not None:
+        # a step starts from surfaces that keep their places: of several equilibria this is the one that is continued
+        start = _start(system, interface, pairs, law, wishes.history, forces=False)
     state = _run(ctx, system, interface, pairs, law, wishes, start, origin)
     if wishes.conditioning and wishes.report is not None:
         wishes.report.set(
@@ -339,10 +344,12 @@ def _slip_origin(
     return law.slip_of(w[:, 1:], r[:, 1:])
 
 
-def _start(system: System, interface: Interface, pairs: ContactPairs, law: Friction, u: ChPoint) -> ContactState:
-    """Make a first guess of a solution; forces that it does not hold are those of equilibrium."""
+def _start(
+    system: System, interface: Interface, pairs: ContactPairs, law: Friction, u: ChPoint, *, forces: bool = True
+) -> ContactState:
+    """Make a first guess of a solution; forces that it does not hold, or must not give, are those of equilibrium."""
     w = _relative(system, interface, pairs, u)
-    r = _forces(system, interface, u)
+    r = _forces(system, interface, u) if forces else None
     if r is None:
         r = np.where(interface.active, (interface.S @ w.ravel() - interface.f).reshape(w.shape), 0.0)
     return check_state(interface, w, r, np.full(len(w), STICK), law, [], None)

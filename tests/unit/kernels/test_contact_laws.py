@@ -1,5 +1,7 @@
 """Contact laws on a few pairs, against closed forms: nothing here needs a mesh."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -155,6 +157,28 @@ def test_strip_pulled_beyond_its_friction_slides():
     slow = solve_coulomb(bare_interface(S, f, 2), 0.3)
     assert slow.report.worst < 1e-8
     assert np.abs(slow.r[:, 1]).sum() == pytest.approx(f[-1], rel=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e6])
+@pytest.mark.parametrize(("degrees", "mu"), [(5.0, 0.2), (10.0, 0.2), (11.0, 0.2), (12.0, 0.2), (30.0, 0.2), (30.0, 0.6)])
+def test_wedge_pushed_between_walls_and_released(degrees, mu, unit):
+    # half a wedge: a spring k across, nothing along; N = P / 2 / (sin a + mu cos a), and it stays when tan a <= mu
+    a, k, push = np.radians(degrees), 50.0 * unit, 10.0 * unit
+    axes = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+    wedge = bare_interface(axes @ np.diag([k, 0.0]) @ axes.T, axes @ np.array([0, -push / 2]), 2)
+    pushed = solve_coulomb(wedge, mu)
+    N = push / 2 / (np.sin(a) + mu * np.cos(a))
+    np.testing.assert_allclose(pushed.r, [[-N, mu * N]], rtol=1e-9)
+    # the spring balances both forces of the wall
+    slip = N * (np.cos(a) - mu * np.sin(a)) / (k * np.sin(a))
+    np.testing.assert_allclose(pushed.w, [[0, -slip]], rtol=1e-9, atol=1e-12)
+    bare = wedge.with_load(np.zeros(2))
+    stuck = replace(pushed, r=(bare.S @ pushed.w.ravel()).reshape(1, 2))
+    released = solve_coulomb(bare, mu, start=stuck, slip_origin=pushed.w[:, 1:])
+    kept = k * slip * np.sin(a) * np.cos(a) if np.tan(a) <= mu else 0.0
+    np.testing.assert_allclose(released.r[0, 0], -kept, rtol=1e-9, atol=1e-9 * N)
+    np.testing.assert_allclose(released.r[0, 1], -kept * np.tan(a), rtol=1e-9, atol=1e-9 * N)
+    assert released.report.worst < 1e-6
 
 
 def test_pulled_off():

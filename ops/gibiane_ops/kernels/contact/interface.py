@@ -71,6 +71,11 @@ class Interface:
         """Relative displacement that ``force_scale`` gives to the stiffness ``kref``."""
         return self.force_scale / self.kref
 
+    def working_force(self, slip_origin: FloatArray | None) -> float:
+        """Give ``force_scale``; without a load, the force that earlier slips can keep: a released body has no other."""
+        earlier = 0.0 if slip_origin is None else float(np.abs(slip_origin).max(initial=0))
+        return self.force_scale or self.kref * earlier
+
     def with_load(self, f: FloatArray, gap: FloatArray | None = None) -> Interface:
         """Replace the load, and the gaps if given, keeping S."""
         return replace(self, f=f, gap=self.gap if gap is None else gap)

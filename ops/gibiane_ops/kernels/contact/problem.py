@@ -67,7 +67,7 @@ class Problem:
     ) -> Problem:
         """Scale an interface, a law and earlier slips; gamma is given over kref."""
         n, d = interface.n_pairs, interface.dim
-        force = interface.force_scale or 1.0
+        force = interface.working_force(slip_origin) or 1.0
         length = force / interface.kref
         S = interface.S / interface.kref
         S_newton = S + REGULARISATION * interface.rigid @ interface.rigid.T

@@ -118,7 +118,7 @@ def check_state(
     -------
     ContactState
     """
-    force = max(float(np.abs(r).max(initial=0)), interface.force_scale) or 1.0
+    force = max(float(np.abs(r).max(initial=0)), interface.working_force(slip_origin)) or 1.0
     length = max(float(np.abs(w).max(initial=0)), force / interface.kref)
     bonded = np.zeros(len(w), dtype=bool) if bonded is None else bonded
     slip = law.slip_of(w[:, 1:] - (0.0 if slip_origin is None else slip_origin), r[:, 1:])
