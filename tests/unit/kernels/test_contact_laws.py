@@ -160,7 +160,9 @@ def test_strip_pulled_beyond_its_friction_slides():
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e6])
-@pytest.mark.parametrize(("degrees", "mu"), [(5.0, 0.2), (10.0, 0.2), (11.0, 0.2), (12.0, 0.2), (30.0, 0.2), (30.0, 0.6)])
+@pytest.mark.parametrize(
+    ("degrees", "mu"), [(5.0, 0.2), (10.0, 0.2), (11.0, 0.2), (12.0, 0.2), (30.0, 0.2), (30.0, 0.6)]
+)
 def test_wedge_pushed_between_walls_and_released(degrees, mu, unit):
     # half a wedge: a spring k across, nothing along; N = P / 2 / (sin a + mu cos a), and it stays when tan a <= mu
     a, k, push = np.radians(degrees), 50.0 * unit, 10.0 * unit
