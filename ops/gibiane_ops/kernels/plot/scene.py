@@ -147,7 +147,7 @@ def _main_axes(figure: Figure, size: tuple[int, int], *, plane: bool, bar: bool,
     return axes, width, height
 
 
-def _seen_flat(layers: Sequence[Layer], view: Sequence[float] | None) -> bool:
+def _seen_flat(layers: Sequence[Layer], view: tuple[float, float, float] | FloatArray | None) -> bool:
     """Whether points of one height are seen from straight above."""
     if view is None or not float(np.hypot(view[0], view[1])) <= 1e-3 * float(view[2]):
         return False
