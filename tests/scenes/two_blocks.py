@@ -66,7 +66,7 @@ class Blocks:
             second = base[np.argmin(points[base, 1] - points[base, 0])]
             dofs = np.r_[dofs, 3 * first, 3 * first + 1, 3 * second + 1]
         self.reduction = fixing(dofs, 3 * len(points))
-        self.tied = condense(self.K, self.pairs, self.reduction)
+        self.tied = condense(self.K, self.pairs, self.reduction, points=self.points)
         self.interface = self.tied.interface(self.F)
 
     def node(self, x, y, z, among=None):

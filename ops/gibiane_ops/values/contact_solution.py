@@ -13,23 +13,26 @@ from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import errors as k_errors
 from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
-from gibiane_ops.kernels.contact.condense import Condensation, condense
+from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution, condense
 from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring_condition
+from gibiane_ops.kernels.contact.correction import Corrected, solve_stuck
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import solve_tied
 from gibiane_ops.kernels.contact.pairs import ContactPairs, facets_of_body
 from gibiane_ops.kernels.contact.report import OPEN, STICK, ContactState, check_state
+from gibiane_ops.kernels.contact.strategy import as_found
 from gibiane_ops.kernels.contact.uniqueness import compare_starts
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.geometry import facet_normals
 from gibiane_ops.values.champs import ChPoint
+from gibiane_ops.values.contact_run import Prepared, run_on_bodies, way_of
 from gibiane_ops.values.failures import worded
+from gibiane_ops.values.linear import solver_wish
 from gibiane_ops.values.methods import Method
 from gibiane_ops.values.nodes import FloatArray, IntArray
 from gibiane_ops.values.rapport import TOLD, counted, departures, fill_report, success, tell_distance, tell_others
 from gibiane_ops.values.rigidite import Rigidite
-from gibiane_ops.values.solving import check_held, kept, tell_notes
+from gibiane_ops.values.solving import ELASTIC, check_held, kept, tell_notes
 from gibiane_ops.values.system import System
 
 FAR = 0.5
@@ -95,10 +98,15 @@ def solve_contact(
     with worded(ctx, at="k"):
         reduction = reduce_conditions(system.C, imposed)
 
-    def condensed() -> Condensation:
+    exact = wishes.compare or wishes.conditioning or wishes.method.approximate
+
+    def prepare() -> Prepared:
         check_held(ctx, system, _held_rows(system, pairs))
         try:
-            return condense(system.K, pairs, reduction, stops=system.stops)
+            way = way_of(ctx, system, pairs, reduction, exact)
+            points = system.points if system.names in ELASTIC else None
+            bodies = condense(system.K, pairs, reduction, stops=system.stops, points=points, method=way.method)
+            return Prepared(bodies, way)
         except k_errors.SingularSystem as failure:
             ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
         except k_errors.ContradictoryConditions:
@@ -112,30 +120,27 @@ def solve_contact(
             )
 
     with worded(ctx, at="k"):
-        condensation: Condensation = kept(
-            ctx,
-            "contact",
-            k,
-            tuple(each.tobytes() for each in (pairs.pairs, pairs.normals, pairs.row, pairs.node, pairs.coefficient)),
-            condensed,
-        )
-        interface = condensation.interface(F, reduction.offset, system.stop_values(field), pairs.gap)
-    _refuse_held(ctx, pairs, condensation.active, reduction.fixed, len(system.nodes))
-    tell_notes(ctx, condensation.factor)
+        geometry = (pairs.pairs, pairs.normals, pairs.row, pairs.node, pairs.coefficient)
+        key = solver_wish(ctx), *(each.tobytes() for each in geometry)
+        prepared: Prepared = kept(ctx, "contact", k, key, prepare)
+        bodies = prepared.bodies
+        tied = bodies.load(F, reduction.offset)
+        gap = bodies.gaps(tied, system.stop_values(field), pairs.gap)
+    _refuse_held(ctx, pairs, bodies.active, reduction.fixed, len(system.nodes))
+    tell_notes(ctx, bodies.factor)
     law = system.friction()
-    origin = None if wishes.history is None else _slip_origin(ctx, system, interface, pairs, law, wishes.history)
+    frame = bodies.interface_of(tied, bodies.unloaded_stiffness(), gap)
+    origin = None if wishes.history is None else _slip_origin(ctx, system, frame, pairs, law, wishes.history)
     start = None
     if wishes.start is not None:
-        start = _start(system, interface, pairs, law, wishes.start)
+        start = _start(system, bodies, frame, pairs, law, wishes.start)
     elif wishes.history is not None:
         # a step starts from surfaces that keep their places: of several equilibria this is the one that is continued
-        start = _start(system, interface, pairs, law, wishes.history, forces=False)
-    state = _run(ctx, system, interface, pairs, law, wishes, start, origin)
+        start = _start(system, bodies, frame, pairs, law, wishes.history, forces=False)
+    found = _run(ctx, system, prepared, tied, gap, pairs, law, wishes, exact, start, origin)
+    state, interface, u = found.state, found.interface, found.displacement
     if wishes.conditioning and wishes.report is not None:
-        wishes.report.set(
-            "CONDITION", _condition(system, condensation, reduction, interface, state, wishes.method, origin)
-        )
-    u = interface.expand(state.w)
+        wishes.report.set("CONDITION", _condition(system, bodies, reduction, interface, state, wishes.method, origin))
     n = len(pairs.pairs)
     vector = interface.to_global(state.r)[:n]
     on_stops = state.r[n:, 0]
@@ -195,33 +200,40 @@ def _warn_far(ctx: Context, system: System, pairs: ContactPairs, state: ContactS
 def _run(
     ctx: Context,
     system: System,
-    interface: Interface,
+    prepared: Prepared,
+    tied: TiedSolution,
+    gap: FloatArray,
     pairs: ContactPairs,
     law: Friction,
     wishes: Wishes,
+    exact: bool,
     start: ContactState | None,
     origin: FloatArray | None,
-) -> ContactState:
+) -> Corrected:
     """Run the method, look for other solutions if asked, and fill the report."""
     method, converged, message = wishes.method, True, ""
     try:
         if wishes.bonded:
-            state = solve_tied(interface)
+            found = solve_stuck(prepared.bodies, tied, gap)
         else:
             with worded(ctx, at="k"):
-                state = method.solve(interface, law, start=start, slip_origin=origin)
-        message = success(method, state)
+                found = run_on_bodies(
+                    ctx, prepared, tied, gap, law, method, exact=exact, start=start, slip_origin=origin
+                )
+        message = success(method, found.state)
     except (k_errors.NotConverged, k_errors.StatusCycle, k_errors.ContactUnbalanced) as failure:
         best = failure.best
         if not isinstance(best, ContactState):
             raise
-        state, converged, message = best, False, _reason(failure, interface)
+        found, converged = as_found(prepared.bodies, tied, gap, best), False
+        message = _reason(failure, found.interface)
         if not wishes.lenient:
             if wishes.report is not None:
-                _report(wishes.report, system, method, interface, state, converged, message)
+                _report(wishes.report, system, method, found.interface, best, converged, message)
             _fail(ctx, failure, message, method)
         if wishes.report is None:
             ctx.warn(1119, "contact has not converged: {reason}", reason=message, at="k")
+    interface, state = found.interface, found.state
     if wishes.report is not None:
         _report(wishes.report, system, method, interface, state, converged, message)
         if method.approximate and not wishes.bonded:
@@ -239,23 +251,23 @@ def _run(
         _warn_far(ctx, system, pairs, state)
     if wishes.compare and converged:
         # an approximate method may be far from every solution: the exact one is what is unique or not
-        exact = method.solve_exact(interface, law, origin) if method.approximate else state
-        found = compare_starts(interface, law, exact, slip_origin=origin)
+        first = method.solve_exact(interface, law, origin) if method.approximate else state
+        others = compare_starts(interface, law, first, slip_origin=origin)
         if wishes.report is not None:
-            wishes.report.set("UNIQUE", found.unique)
-            tell_others(wishes.report, found.others)
-        if not found.unique:
+            wishes.report.set("UNIQUE", others.unique)
+            tell_others(wishes.report, others.others)
+        if not others.unique:
             ctx.warn(
                 "G413",
                 "several solutions exist: the one returned has {here}; other starts of the iterations lead to "
                 "{others}, with forces that differ by {share} of the largest",
                 at="k",
                 here=counted(state),
-                others=" / ".join(dict.fromkeys(counted(other) for other in found.others)),
-                share=f"{found.difference:.2g}",
+                others=" / ".join(dict.fromkeys(counted(other) for other in others.others)),
+                share=f"{others.difference:.2g}",
                 hint="large friction coefficients allow several equilibria; the one returned is that of the method",
             )
-    return state
+    return found
 
 
 def _report(
@@ -345,13 +357,21 @@ def _slip_origin(
 
 
 def _start(
-    system: System, interface: Interface, pairs: ContactPairs, law: Friction, u: ChPoint, *, forces: bool = True
+    system: System,
+    bodies: Condensation,
+    interface: Interface,
+    pairs: ContactPairs,
+    law: Friction,
+    u: ChPoint,
+    *,
+    forces: bool = True,
 ) -> ContactState:
     """Make a first guess of a solution; forces that it does not hold, or must not give, are those of equilibrium."""
     w = _relative(system, interface, pairs, u)
     r = _forces(system, interface, u) if forces else None
     if r is None:
-        r = np.where(interface.active, (interface.S @ w.ravel() - interface.f).reshape(w.shape), 0.0)
+        force = bodies.force(w.ravel(), bodies.tied.solve(bodies.coupling(w.ravel()))) - interface.f
+        r = np.where(interface.active, force.reshape(w.shape), 0.0)
     return check_state(interface, w, r, np.full(len(w), STICK), law, [], None)
 
 

@@ -115,7 +115,7 @@ def solve_linear(
     reduction = reduced(ctx, system, np.column_stack([values for _, values in loads]))
     if not system.symmetric:
         return _unsymmetric(ctx, system, reduction, F)
-    wish = _wish(ctx)
+    wish = solver_wish(ctx)
     definite = bool((system.K.diagonal()[reduction.free] > 0).all())
     space = int(ctx.option("DIME"))
 
@@ -190,7 +190,8 @@ def _tell_solution(ctx: Context, factor: Factor) -> None:
         ctx.write(f" RESO : {count}relative residual below {reached:.0e}{minus}")
 
 
-def _wish(ctx: Context) -> str:
+def solver_wish(ctx: Context) -> str:
+    """Return the solver that OPTI 'RESO' asks for: DIRE, ITER, or nothing."""
     word = str(ctx.session.options.get("RESO") or "")[:4]
     if word not in ("", "DIRE", "ITER"):
         ctx.fail(19, "OPTI 'RESO' '{word}' is not available", word=word, hint="'DIRE', 'ITER', or neither")

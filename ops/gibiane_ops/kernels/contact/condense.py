@@ -7,56 +7,171 @@ of the tied bodies, positive definite as soon as one of them is held. Eliminatin
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
+from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.constraints import Reduction
+from gibiane_ops.kernels.contact.compliance import PairStiffness
+from gibiane_ops.kernels.contact.fields import Fields
 from gibiane_ops.kernels.contact.frames import local_frames
-from gibiane_ops.kernels.contact.interface import FREE_LIMIT, Interface
+from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.kernels.contact.relative_motion import rigid_candidates
+from gibiane_ops.kernels.contact.small_model import SmallModel, interpolation, schur, small_model
+from gibiane_ops.kernels.contact.tied import TiedSolver, tied_solver
 from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.errors import SingularSystem, TooLarge
-from gibiane_ops.kernels.solve import Factor, factorize
+from gibiane_ops.kernels.solve import Factor
 
 BoolArray = NDArray[np.bool_]
 
 MEMORY_LIMIT = 4e9
 """Bytes that the dense interface may take when the caller sets no limit."""
 
-BLOCK = 64
-"""Right-hand sides solved together: enough for the dense kernels, few enough to keep the memory low."""
+REMEMBERED = 6
+"""Displacements kept to start the iterations of other loads and coefficients from."""
 
 
 @dataclass(frozen=True, eq=False)
+class TiedSolution:
+    """What one load gives on the tied bodies.
+
+    Attributes
+    ----------
+    F0 : (n_dofs,) float64
+        Load without the part of prescribed displacements.
+    U0 : (n_dofs,) float64
+        Displacement at v = 0 and w = 0.
+    x : (n_v,) float64
+        Displacement of the tied bodies.
+    f : (n d,) float64
+        Condensed load.
+    """
+
+    F0: FloatArray
+    U0: FloatArray
+    x: FloatArray
+    f: FloatArray
+
+
+@dataclass(eq=False)
 class Condensation:
-    """Tied matrix, its factor and the Schur complement on the pairs: whatever does not depend on the load.
+    """Tied matrix, what solves with it and the stiffness of the pairs: whatever does not depend on the load.
 
     Attributes
     ----------
     contact : ContactPairs
-    factor : Factor
-        Of the tied matrix.
-    S : (n d, n d) float64
+    tied : TiedSolver
+    frames : (n, d, d) float64
+    active : (n, d) bool
         See ``Interface``.
+    n_stops : int
     """
 
     contact: ContactPairs
-    factor: Factor
-    S: FloatArray
-    kref: float
+    tied: TiedSolver
     frames: FloatArray
     active: BoolArray
-    rigid: FloatArray
     n_stops: int
     _shortening: FloatArray
     _K: sp.csr_array
+    _KBw: sp.csr_array
     _Kvw: sp.csr_array
-    _fields: _Fields
+    _fields: Fields
     _reduction: Reduction
+    _points: FloatArray | None
+    _exact: PairStiffness | None = field(default=None, init=False)
+    _small: SmallModel | None = field(default=None, init=False)
+    _last: TiedSolution | None = field(default=None, init=False)
+    learned: PairStiffness | None = field(default=None, init=False)
+    _known: list[tuple[FloatArray, FloatArray]] = field(default_factory=list, init=False)
+
+    @property
+    def factor(self) -> Factor:
+        """What solves with the tied matrix."""
+        return self.tied.factor
+
+    @property
+    def n_components(self) -> int:
+        """Components of w that can vary."""
+        return int(self.active.sum())
+
+    @property
+    def has_coordinates(self) -> bool:
+        """Whether the small model can be built."""
+        return self._points is not None and not self.n_stops
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the exact stiffness is known already."""
+        return self._exact is not None
+
+    def exact(self) -> PairStiffness:
+        """Compute the exact stiffness of the pairs, once.
+
+        Cost
+        ----
+        One solution with the tied matrix per active component of w.
+        """
+        if self._exact is None:
+            S = schur(self.tied, self._Kvw, self._Kww(), np.flatnonzero(self.active.ravel()))
+            if self.n_stops:
+                candidates = np.eye(len(S))[:, self.active.ravel()]
+            else:
+                candidates = rigid_candidates(self.contact, self.frames, self.active)
+            energy = candidates.T @ S @ candidates
+            self._exact = PairStiffness.of(S, self.active, self._elastic(), candidates, energy, exact=True)
+        return self._exact
+
+    def small(self) -> SmallModel:
+        """Build the small model of the bodies, once; ``learned`` starts as its stiffness."""
+        if self._small is None:
+            columns = np.flatnonzero(self.active.ravel())
+            self._small = small_model(self.tied.A, self._Kvw, self._Kww(), self._coarse(), columns)
+            candidates = rigid_candidates(self.contact, self.frames, self.active)
+            # the small model holds every rigid motion: the true energy of its fields tells which are free
+            moved = self._fields.Bw @ candidates - self._fields.Bv @ self._small.solve(self._Kvw @ candidates)
+            energy = moved.T @ (self._K @ moved)
+            self.learned = PairStiffness.of(
+                self._small.S, self.active, self._elastic(), candidates, energy, exact=False
+            )  # fmt: skip
+        return self._small
+
+    def load(self, F: FloatArray, offset: FloatArray | None = None) -> TiedSolution:
+        """Solve the tied bodies under a load and prescribed displacements.
+
+        Parameters
+        ----------
+        F : (n_dofs,) float64, force
+        offset : (n_dofs,) float64, optional
+            ``Reduction.offset`` of the same conditions with other prescribed values; those given to ``condense`` when
+            left out.
+
+        Returns
+        -------
+        TiedSolution
+            That of the last call when the load has not changed.
+
+        Cost
+        ----
+        One solution with the tied matrix.
+        """
+        fields, last = self._fields, self._last
+        U0 = fields.constant(self._reduction.offset if offset is None else offset)
+        F0 = F - self._K @ U0
+        if last is not None and np.array_equal(last.F0, F0) and np.array_equal(last.U0, U0):
+            return last
+        right = fields.Bv.T @ F0
+        x = self.tied.solve(right)
+        if not self.tied.direct and self.has_coordinates:
+            x = x + self.small().solve(right - self.tied.A @ x)
+        f = np.asarray(fields.Bw.T @ F0 - self._Kvw.T @ x)
+        self._last = TiedSolution(F0, U0, x, f)
+        return self._last
 
     def interface(
         self,
@@ -65,14 +180,12 @@ class Condensation:
         stop_values: FloatArray | None = None,
         gap: FloatArray | None = None,
     ) -> Interface:
-        """Condense a load and prescribed displacements on the pairs.
+        """Condense a load and prescribed displacements on the pairs, exactly.
 
         Parameters
         ----------
-        F : (n_dofs,) float64, force
-        offset : (n_dofs,) float64, optional
-            ``Reduction.offset`` of the same conditions with other prescribed values; those given to ``condense`` when
-            left out.
+        F, offset
+            See ``load``.
         stop_values : (n_stops,) float64, optional
             Largest values of the stops, zero when left out.
         gap : (n_pairs,) float64, length, optional
@@ -85,28 +198,80 @@ class Condensation:
 
         Cost
         ----
-        One solution with the tied matrix.
+        One solution with the tied matrix, and what ``exact`` costs.
         """
-        fields = self._fields
-        U0 = fields.constant(self._reduction.offset if offset is None else offset)
-        F0 = F - self._K @ U0
-        x0 = self.factor.solve(fields.Bv.T @ F0)
-        f = np.asarray(fields.Bw.T @ F0 - self._Kvw.T @ x0)
-        # prescribed displacements of both nodes of a pair: part of the gap is already used up
-        d = self.active.shape[1]
-        relative = self.contact.matrix(len(U0) // d) @ U0.reshape(-1, d)
-        start = self.contact.gap if gap is None else gap
-        start = (start - (relative * self.contact.normals).sum(axis=1)) / self._shortening
-        stops = np.zeros(self.n_stops) if stop_values is None else stop_values
+        solution = self.load(F, offset)
+        return self.interface_of(solution, self.exact(), self.gaps(solution, stop_values, gap))
+
+    def interface_of(self, solution: TiedSolution, stiffness: PairStiffness, gap: FloatArray) -> Interface:
+        """Put together an interface whose stiffness may be approximate."""
 
         def expand(w: FloatArray) -> FloatArray:
             flat = np.ravel(w)
-            x = x0 - self.factor.solve(self._Kvw @ flat)
-            return np.asarray(fields.Bv @ x + fields.Bw @ flat + U0)
+            return self.displacement(solution, flat, self.tied.solve(self._Kvw @ flat))
 
         return Interface(
-            self.S, f, np.concatenate([start, stops]), self.frames, self.active, self.rigid, self.kref, expand
-        )
+            stiffness.S, solution.f, gap, self.frames, self.active, stiffness.rigid, stiffness.kref, expand
+        )  # fmt: skip
+
+    def unloaded_stiffness(self) -> PairStiffness:
+        """Give an empty stiffness, for what needs no more than the geometry of the pairs and their load."""
+        size = self.active.size
+        return PairStiffness(sp.csr_array((size, size)), self._elastic(), np.zeros((size, 0)), False)
+
+    def displacement(self, solution: TiedSolution, w: FloatArray, x: FloatArray) -> FloatArray:
+        """Compute the displacement of every unknown from w, (n d,), and x with ``Kvv x = Kvw w``."""
+        return np.asarray(self._fields.Bv @ (solution.x - x) + self._fields.Bw @ w + solution.U0)
+
+    def coupling(self, w: FloatArray) -> FloatArray:
+        """Compute ``Kvw w``, the force of relative displacements on the tied bodies."""
+        return np.asarray(self._Kvw @ w)
+
+    def force(self, w: FloatArray, x: FloatArray) -> FloatArray:
+        """Compute ``S w`` from x with ``Kvv x = Kvw w``."""
+        return np.asarray(self._fields.Bw.T @ (self._KBw @ w) - self._Kvw.T @ x)
+
+    def remember(self, w: FloatArray, x: FloatArray) -> None:
+        """Keep a solution of ``Kvv x = Kvw w``, from which iterations for another w will start."""
+        if not self.tied.direct and w.any():
+            self._known = [*self._known[1 - REMEMBERED :], (w, x)]
+
+    def recalled(self, w: FloatArray) -> FloatArray:
+        """Combine the solutions kept so as to come close to that of w."""
+        if not self._known:
+            return np.zeros(self.tied.A.shape[0])
+        W, X = (np.column_stack(columns) for columns in zip(*self._known, strict=True))
+        return np.asarray(X @ np.linalg.lstsq(W, w, rcond=1e-8)[0])
+
+    def gaps(
+        self, solution: TiedSolution, stop_values: FloatArray | None = None, gap: FloatArray | None = None
+    ) -> FloatArray:
+        """Compute what is left of the gaps when prescribed displacements of both sides are applied, and the stops."""
+        d = self.active.shape[1]
+        relative = self.contact.matrix(len(solution.U0) // d) @ solution.U0.reshape(-1, d)
+        start = self.contact.gap if gap is None else gap
+        start = (start - (relative * self.contact.normals).sum(axis=1)) / self._shortening
+        return np.concatenate([start, np.zeros(self.n_stops) if stop_values is None else stop_values])
+
+    def _Kww(self) -> FloatArray:
+        return np.asarray((self._fields.Bw.T @ self._KBw).toarray())
+
+    def _elastic(self) -> float:
+        return float(self._K.diagonal().mean())
+
+    def _coarse(self) -> sp.csr_array:
+        """Interpolate the tied unknowns: those near the contact kept, the others on coarse grids."""
+        from scipy.sparse.csgraph import connected_components
+
+        assert self._points is not None
+        roots, d = self._fields.roots(), self.active.shape[1]
+        Bv, Bw = self._fields.Bv, self._fields.Bw
+        near = roots < 0
+        near[Bv[np.flatnonzero(np.diff(Bw.indptr))].indices] = True
+        near[np.flatnonzero(np.diff(self._Kvw.indptr))] = True
+        roots = np.maximum(roots, 0)
+        body = connected_components(self._K, directed=False)[1].astype(np.int64)
+        return interpolation(self.tied.A, near, body[roots], self._points[roots // d], roots % d)
 
 
 def condense(
@@ -115,10 +280,11 @@ def condense(
     reduction: Reduction,
     *,
     stops: sp.csr_array | None = None,
+    points: FloatArray | None = None,
     method: str = "auto",
     memory_limit: float = MEMORY_LIMIT,
 ) -> Condensation:
-    """Factorise the tied bodies and compute the Schur complement on the contact pairs.
+    """Tie the bodies on their contact pairs and factorise them.
 
     Parameters
     ----------
@@ -130,6 +296,8 @@ def condense(
         Conditions other than contact, from ``reduce_conditions`` with one column of prescribed values.
     stops : (n_stops, n_dofs) CSR, optional
         Unilateral conditions ``stops @ u <= value``, independent of each other and of the conditions of ``reduction``.
+    points : (n_nodes, d) float64, optional
+        Coordinates of the nodes, which the small model and iterations need.
     method : str
         Package, see ``factorize``.
     memory_limit : float
@@ -158,7 +326,7 @@ def condense(
 
     Cost
     ----
-    One factorisation, one back substitution per active component of w, (n d)^2 numbers of memory.
+    One factorisation.
     """
     d = contact.normals.shape[1]
     n_dofs = K.shape[0]
@@ -173,32 +341,18 @@ def condense(
         Bw = sp.hstack([Bw, sp.csr_array((n_dofs, n_stops * d))], format="csr")
         frames = np.concatenate([frames, np.broadcast_to(np.eye(d), (n_stops, d, d))])
         active = np.concatenate([active, np.broadcast_to(np.arange(d) == 0, (n_stops, d))])
-    fields = _Fields.of(Bv, Bw, B0, reduction, stops, d)
-    KBw = K @ fields.Bw
+    fields = Fields.of(Bv, Bw, B0, reduction, stops, d)
+    KBw = sp.csr_array(K @ fields.Bw)
     Kvw = sp.csr_array(fields.Bv.T @ KBw)
     try:
-        factor = factorize(fields.Bv.T @ K @ fields.Bv, method=method)
+        roots = fields.roots() if method in ("amg", "cg") else None
+        tied = tied_solver(sp.csr_array(fields.Bv.T @ K @ fields.Bv), method=method, roots=roots, points=points)
     except SingularSystem as error:
         moving = np.unique(fields.Bv[:, error.unknowns].nonzero()[0])
         raise SingularSystem(f"tied bodies: {error.message}", np.unique(moving // d), moving) from error
-    S = _schur(factor, Kvw, (fields.Bw.T @ KBw).toarray(), np.flatnonzero(active.ravel()))
-    kref = _natural_stiffness(K, S, active)
-    inactive = np.flatnonzero(~active.ravel())
-    S[inactive, inactive] = kref
-    candidates = np.eye(len(S))[:, active.ravel()] if n_stops else _rigid_candidates(contact, frames, active)
-    values, vectors = np.linalg.eigh(candidates.T @ S @ candidates)
-    rigid = np.asarray(candidates @ vectors[:, values < FREE_LIMIT * kref])
     return Condensation(
-        contact, factor, S, kref, frames, active, rigid, n_stops, shortening, K, Kvw, fields, reduction
+        contact, tied, frames, active, n_stops, shortening, K, KBw, Kvw, fields, reduction, points
     )  # fmt: skip
-
-
-def _natural_stiffness(K: sp.csr_array, S: FloatArray, active: BoolArray) -> float:
-    """Average the active diagonal of S, or that of K when every relative motion is rigid."""
-    if not active.any():
-        return 1.0
-    mean, elastic = float(np.diag(S)[active.ravel()].mean()), float(K.diagonal().mean())
-    return mean if mean > FREE_LIMIT * elastic else elastic
 
 
 def interface_memory(n_pairs: int, dim: int) -> float:
@@ -216,74 +370,6 @@ def interface_memory(n_pairs: int, dim: int) -> float:
     return 5 * 8.0 * (n_pairs * dim) ** 2
 
 
-@dataclass(frozen=True, eq=False)
-class _Fields:
-    """Every admissible displacement, ``U = Bv x + Bw w + constant``, w in local components."""
-
-    Bv: sp.csr_array
-    Bw: sp.csr_array
-    B0: sp.csr_array
-    fixed: IntArray
-    tied: IntArray
-    relations: sp.csr_array
-    tie_matrix: sp.csr_array
-
-    @staticmethod
-    def of(
-        Bv: sp.csr_array, Bw: sp.csr_array, B0: sp.csr_array, reduction: Reduction, stops: sp.csr_array | None, d: int
-    ) -> _Fields:
-        """Add the linear relations, ``u[tied] = relation u[free] + offset[tied]``, as conditions on v given w.
-
-        A stop adds ``c . u = w_n``, w_n being the first component of its pair, and the pairs of stops are the last.
-        """
-        n_dofs, tied = reduction.n, reduction.tied
-        select = sp.eye_array(n_dofs, format="csr")
-        relations = sp.csr_array(select[tied] - reduction.relation @ select[reduction.free])
-        unit = sp.csr_array((len(tied), Bw.shape[1]))
-        if stops is not None and stops.shape[0]:
-            n_stops = stops.shape[0]
-            own = sp.csr_array(
-                (np.ones(n_stops), (np.arange(n_stops), Bw.shape[1] - d * np.arange(n_stops, 0, -1))),
-                (n_stops, Bw.shape[1]),
-            )
-            relations, unit = sp.vstack([relations, stops], format="csr"), sp.vstack([unit, own], format="csr")
-        if not relations.shape[0]:
-            return _Fields(Bv, Bw, B0, reduction.fixed, tied, relations, Bv)
-        right = sp.csc_array(unit - relations @ Bw)
-        touched = np.flatnonzero(np.diff(right.indptr))
-        if not len(touched):
-            touched = np.zeros(1, np.int64)  # relations away from contact: one column of zeros
-        second = reduce_conditions(relations @ Bv, right[:, touched].toarray())
-        chosen = sp.eye_array(Bv.shape[1], format="csr")
-        T = chosen[:, second.free] + chosen[:, second.tied] @ second.relation
-        follow = sp.csr_array(second.offset) @ sp.eye_array(Bw.shape[1], format="csr")[touched]
-        return _Fields(
-            sp.csr_array(Bv @ T), sp.csr_array(Bw + Bv @ follow), B0, reduction.fixed, tied, relations, Bv
-        )  # fmt: skip
-
-    def constant(self, offset: FloatArray) -> FloatArray:
-        """Compute the displacement at x = 0 and w = 0."""
-        U0 = np.asarray(self.B0 @ offset[self.fixed])
-        if self.relations.shape[0]:
-            values = np.zeros(self.relations.shape[0])
-            values[: len(self.tied)] = offset[self.tied]
-            rest = values - self.relations @ U0
-            U0 = U0 + self.tie_matrix @ reduce_conditions(self.relations @ self.tie_matrix, rest).offset
-        return U0
-
-
-def _schur(factor: Factor, Kvw: sp.csr_array, S: FloatArray, columns: IntArray) -> FloatArray:
-    """Subtract ``Kwv Kvv^-1 Kvw`` by blocks of columns; only the rows that Kvw touches are kept."""
-    rows = np.flatnonzero(np.diff(Kvw.indptr))
-    touched = Kvw[rows].T.tocsr()
-    right = Kvw.tocsc()
-    for start in range(0, len(columns), BLOCK):
-        block = columns[start : start + BLOCK]
-        X = factor.solve(right[:, block].toarray())
-        S[:, block] -= touched @ X[rows]
-    return (S + S.T) / 2
-
-
 def _to_global(frames: FloatArray, active: BoolArray) -> sp.csr_array:
     """Give the matrix from active local components to global ones, block diagonal."""
     n, d = active.shape
@@ -291,41 +377,3 @@ def _to_global(frames: FloatArray, active: BoolArray) -> sp.csr_array:
         return sp.csr_array((0, 0))
     blocks = np.where(active[:, None, :], np.swapaxes(frames, 1, 2), 0.0)
     return sp.bsr_array((blocks, np.arange(n), np.arange(n + 1)), shape=(n * d, n * d)).tocsr()
-
-
-def _rigid_candidates(contact: ContactPairs, frames: FloatArray, active: BoolArray) -> FloatArray:
-    """Span the relative rigid motions of each zone that blocked components allow, by an orthonormal basis."""
-    points = contact.on_pairs(contact.points)
-    modes = [
-        np.einsum("nij,njk->nik", frames, _rigid_modes(points, contact.zone == zone)).reshape(active.size, -1)
-        for zone in np.unique(contact.zone)
-    ]
-    candidates = _orthonormal(np.hstack(modes))
-    # keep the combinations that leave blocked components at rest
-    blocked = candidates[~active.ravel()]
-    if len(blocked):
-        _, values, Vt = np.linalg.svd(blocked, full_matrices=True)
-        at_rest = np.r_[values, np.zeros(len(Vt) - len(values))] <= FREE_LIMIT
-        candidates = _orthonormal(candidates @ Vt[at_rest].T)
-    return candidates
-
-
-def _rigid_modes(points: FloatArray, member: BoolArray) -> FloatArray:
-    """Build the 3 or 6 rigid motions of the members, (n, d, k), in global components and of order 1."""
-    n, d = points.shape
-    x = points - points[member].mean(axis=0)
-    x = x / max(float(np.abs(x[member]).max()), np.finfo(float).tiny)
-    planes = [(i, j) for i in range(d) for j in range(i + 1, d)]
-    modes = np.zeros((n, d, d + len(planes)))
-    modes[:, range(d), range(d)] = 1
-    for k, (i, j) in enumerate(planes):
-        modes[:, i, d + k] = -x[:, j]
-        modes[:, j, d + k] = x[:, i]
-    modes[~member] = 0
-    return modes
-
-
-def _orthonormal(columns: FloatArray) -> FloatArray:
-    """Give an orthonormal basis of the span; one pair or pairs on a line have fewer motions than six."""
-    U, values, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(U[:, values > FREE_LIMIT * values.max(initial=1.0)])

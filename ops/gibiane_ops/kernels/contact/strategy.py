@@ -1,0 +1,187 @@
+"""Which way to a contact solution: exact stiffness of the pairs, or a small model that tied solutions correct."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.choice import MEMORY_SHARE, direct_memory, iterative_memory
+from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution, interface_memory
+from gibiane_ops.kernels.contact.correction import (
+    Corrected,
+    Failure,
+    Run,
+    Stalled,
+    solve_corrected,
+    solve_stuck,
+    tied_holds,
+)
+from gibiane_ops.kernels.contact.law import Friction
+from gibiane_ops.kernels.contact.report import ContactState
+from gibiane_ops.kernels.errors import NotConverged
+from gibiane_ops.kernels.memory import available_memory
+
+SMALL = 10_000
+"""Tied unknowns up to which the exact stiffness costs no more than the small model."""
+
+FEW = 24
+"""Components of w up to which back substitutions cost no more than the small model."""
+
+LARGE = 300_000
+"""Tied unknowns in space above which multigrid replaces the factor."""
+
+LONGEST = 900.0
+"""Seconds of back substitutions that a fallback may take."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a contact problem will be solved.
+
+    Attributes
+    ----------
+    method : str
+        ``auto`` (a factor) or ``amg``, see ``factorize``.
+    exact : bool
+        Exact stiffness at once.
+    memory : float
+        Predicted peak, bytes, without what the mesh and the matrix take.
+    work : float
+        Predicted operations.
+    """
+
+    method: str
+    exact: bool
+    memory: float
+    work: float
+
+
+def plan(
+    n: int,
+    entries: int,
+    components: int,
+    dim: int,
+    *,
+    wish: str = "",
+    coordinates: bool = True,
+    all_exact: bool = False,
+) -> Plan:
+    """Choose the solver of the tied bodies and the way to the stiffness of the pairs.
+
+    Parameters
+    ----------
+    n, entries : int
+        Tied unknowns, and entries of their matrix.
+    components : int
+        Active components of w.
+    dim : int
+    wish : str
+        ``DIRE`` or ``ITER`` when the user prefers one.
+    coordinates : bool
+        Whether the small model can be built.
+    all_exact : bool
+        Whether the method needs the exact stiffness.
+
+    Returns
+    -------
+    Plan
+    """
+    room = MEMORY_SHARE * available_memory()
+    multigrid = dim == 3 and coordinates
+    direct = wish == "DIRE" or not multigrid or (wish != "ITER" and n <= LARGE and direct_memory(n, dim) <= room)
+    exact = all_exact or not coordinates or (direct and (n <= SMALL or components <= FEW or dim == 2))
+    tied = direct_memory(n, dim) if direct else iterative_memory(entries)
+    memory = tied + interface_memory(components // dim, dim) + (0.0 if exact else 12.0 * entries)
+    # a factor takes about n^2 operations in space, each of its solutions the square root of that in order of n^(4/3)
+    once = (30.0 * n ** (4 / 3) if dim == 3 else 10.0 * n * np.log2(max(n, 2))) if direct else 60.0 * entries
+    setup = (20.0 * n**2 if dim == 3 else 10.0 * n**1.5) if direct else 400.0 * entries
+    return Plan("auto" if direct else "amg", exact, memory, setup + once * (components if exact else 8))
+
+
+def solve_on_bodies(
+    bodies: Condensation,
+    load: TiedSolution,
+    gap: FloatArray,
+    law: Friction,
+    run: Run,
+    *,
+    newton: Run | None,
+    exact: bool,
+    tied_first: bool,
+    slip_origin: FloatArray | None = None,
+    tell: Callable[[int, float], None] | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> Corrected:
+    """Run a method on the exact stiffness, or on the small model with corrections and the exact one in reserve.
+
+    Parameters
+    ----------
+    bodies : Condensation
+    load : TiedSolution
+    gap : (n,) float64
+    law : Friction
+    run : callable
+        The method.
+    newton : callable or None
+        Run first on the small model when the method is another: it learns the most for the least.
+    exact : bool
+        From the plan.
+    tied_first : bool
+        Whether the state of tied bodies may be the answer, without any model.
+    slip_origin : (n, d - 1) float64, optional
+    tell : callable, optional
+        See ``solve_corrected``.
+    say : callable
+        Told in words why the exact stiffness is computed after all.
+
+    Returns
+    -------
+    Corrected
+
+    Raises
+    ------
+    NotConverged, StatusCycle, ContactUnbalanced
+        From the method on the exact stiffness; on the small model when the exact one would take too long.
+    """
+    if not exact and not bodies.is_exact:
+        frame = bodies.interface_of(load, bodies.unloaded_stiffness(), gap)
+        if tied_first and tied_holds(frame, law, slip_origin):
+            return solve_stuck(bodies, load, gap)
+        try:
+            if newton is not None:
+                solve_corrected(bodies, load, gap, newton, tell=tell)
+            return solve_corrected(bodies, load, gap, run, tell=tell)
+        except (Stalled, *Failure) as failure:
+            seconds = bodies.n_components * bodies.tied.seconds / (8 if bodies.tied.direct else 1)
+            stalled = isinstance(failure, Stalled)
+            if seconds > LONGEST:
+                if isinstance(failure, Stalled):
+                    raise NotConverged(failure.differences, failure.state) from failure
+                raise
+            reason = str(failure) if stalled else "no solution on the small model"
+            say(f"{reason}; exact stiffness by {bodies.n_components} back substitutions, about {seconds:.0f} s")
+    interface = bodies.interface_of(load, bodies.exact(), gap)
+    state = run(interface)
+    return Corrected(state, interface, interface.expand(state.w), 0, True)
+
+
+def as_found(bodies: Condensation, load: TiedSolution, gap: FloatArray, state: ContactState) -> Corrected:
+    """Complete a state that a failed method has left, with the stiffness known best.
+
+    Parameters
+    ----------
+    bodies : Condensation
+    load : TiedSolution
+    gap : (n,) float64
+    state : ContactState
+
+    Returns
+    -------
+    Corrected
+    """
+    stiffness = bodies.exact() if bodies.is_exact or bodies.learned is None else bodies.learned
+    interface = bodies.interface_of(load, stiffness, gap)
+    return Corrected(state, interface, interface.expand(state.w), 0, bodies.is_exact)
