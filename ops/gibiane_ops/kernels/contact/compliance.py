@@ -12,8 +12,11 @@ from gibiane_ops.kernels.contact.interface import FREE_LIMIT
 
 BoolArray = NDArray[np.bool_]
 
-NEGLIGIBLE = 1e-13
-"""An error whose energy is below this share of that of the motion says nothing about the stiffness."""
+NEGLIGIBLE = 1e-6
+"""An error of the force that does less work on the motion, over the product of their sizes, is not learned from."""
+
+ROUND_OFF = 1e-12
+"""Nor is one that is smaller than this share of the force."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +69,7 @@ class PairStiffness:
         return PairStiffness(S, kref, rigid, exact)
 
     def still(self, force: FloatArray) -> FloatArray:
-        """Remove the work of a force on the free motions, which ``S w`` cannot have."""
+        """Remove the part along the free motions, on which ``S w`` does no work."""
         return np.asarray(force - self.rigid @ (self.rigid.T @ force))
 
     def learned(self, dw: FloatArray, dy: FloatArray) -> PairStiffness:
@@ -82,9 +85,11 @@ class PairStiffness:
         With d the error of ``S dw``, ``S - d d^T / (d . dw)``. A Galerkin model is too stiff, so that d . dw > 0, and
         the change keeps it too stiff or exact: S stays positive semidefinite and decreases towards the exact one.
         """
-        d = self.S @ dw - dy
-        work = float(d @ dw)
-        if work <= NEGLIGIBLE * abs(float(dw @ (self.S @ dw))):
+        # rigid motions carry no information, and much round-off where the body slides far
+        dw = self.still(dw)
+        d = self.still(self.S @ dw - dy)
+        work, size = float(d @ dw), float(np.linalg.norm(d) * np.linalg.norm(dw))
+        if work <= NEGLIGIBLE * size or size <= ROUND_OFF * float(np.linalg.norm(dy) * np.linalg.norm(dw)):
             return self
         return replace(self, S=self.S - np.outer(d, d / work))
 

@@ -153,7 +153,7 @@ def solve_corrected(
         interface = replace(bodies.interface_of(load, learned, gap), f=f)
         state = run(interface)
         new_w = state.w.ravel()
-        x, y_new = _true_force(bodies, load, new_w, w, x)
+        x, y_new = _true_force(bodies, new_w, w, x, y)
         bodies.learned = learned.learned(new_w - w, y_new - y)
         true = y_new - load.f
         scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
@@ -196,17 +196,19 @@ def solve_stuck(bodies: Condensation, load: TiedSolution, gap: FloatArray) -> Co
 
 
 def _true_force(
-    bodies: Condensation, load: TiedSolution, w: FloatArray, w_before: FloatArray, x_before: FloatArray
+    bodies: Condensation, w: FloatArray, w_before: FloatArray, x_before: FloatArray, y_before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Solve ``Kvv x = Kvw w`` once, from the x before, and give x and ``S w``."""
-    right = bodies.coupling(w)
+    assert bodies.learned is not None
     if bodies.tied.direct:
-        x = bodies.tied.once(right)
-        return x, bodies.force(w, x)
+        # of the change alone: round-off of a body that has slid far would hide the last corrections
+        dw = w - w_before
+        dx = bodies.tied.once(bodies.coupling(dw))
+        return x_before + dx, y_before + bodies.learned.still(bodies.force(dw, dx))
+    right = bodies.coupling(w)
     x = x_before if x_before.any() else bodies.recalled(w)
     x = x + bodies.tied.once(right - bodies.tied.A @ x)
     x = x + bodies.small().solve(right - bodies.tied.A @ x)
-    assert bodies.learned is not None
     return x, bodies.learned.still(bodies.force(w, x))
 
 

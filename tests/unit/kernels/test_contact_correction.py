@@ -1,0 +1,233 @@
+"""Contact by the corrected small model equals contact on the exact stiffness, in scenes of every kind."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from two_blocks import blocks
+
+from gibiane_ops.kernels.assembly import assemble, element_stiffness
+from gibiane_ops.kernels.constraints import reduce_conditions
+from gibiane_ops.kernels.contact.condense import condense
+from gibiane_ops.kernels.contact.correction import Stalled, solve_corrected, tied_holds
+from gibiane_ops.kernels.contact.law import Friction
+from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.pairs import joined, node_pairs
+from gibiane_ops.kernels.contact.strategy import plan, solve_on_bodies
+from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
+from gibiane_ops.kernels.materials import isotropic
+from gibiane_ops.kernels.topology import boundary
+
+TOLERANCE = 1e-8
+
+
+def close(bodies, F, mu, gap=None, method=solve_coulomb):
+    """Solve both ways on fresh small models and compare forces, displacements and statuses."""
+    load = bodies.load(F)
+    gap = bodies.gaps(load, None, gap)
+    found = solve_corrected(bodies, load, gap, lambda interface: method(interface, mu))
+    interface = bodies.interface_of(load, bodies.exact(), gap)
+    exact = method(interface, mu)
+    u = interface.expand(exact.w)
+    np.testing.assert_allclose(found.state.r, exact.r, atol=TOLERANCE * np.abs(exact.r).max())
+    np.testing.assert_allclose(found.displacement, u, atol=TOLERANCE * np.abs(u).max())
+    assert found.state.report.worst < 1e-7
+    return found
+
+
+@pytest.fixture
+def one_ring(monkeypatch):
+    """Keep one layer of nodes only: a small scene would be kept whole."""
+    monkeypatch.setattr("gibiane_ops.kernels.contact.small_model.RINGS", 1)
+
+
+@lru_cache(maxsize=2)
+def scene(name):
+    return blocks(name)
+
+
+def bodies_of(name, method="auto", contrast=1.0, held=()):
+    B = scene(name)
+    K = B.K
+    if contrast != 1.0:
+        upper = np.repeat(B.points[:, 2] > 0, 3)
+        upper[(3 * B.pairs.pairs[:, :1] + np.arange(3)).ravel()] = True
+        D = sp.diags_array(np.where(upper, np.sqrt(contrast), 1.0))
+        K = sp.csr_array(D @ K @ D)
+    return B, condense(K, B.pairs, B.reduction, points=B.points, method=method)
+
+
+@pytest.mark.parametrize("method", ["auto", "amg"])
+@pytest.mark.parametrize(
+    ("name", "mu"), [("T1_1", 0.2), ("T1_1h", 0.05), ("T1_1h", 2.0), ("T4_4h", 0.0), ("T1_1", 0.0)]
+)
+def test_equals_the_exact_stiffness(name, mu, method, one_ring):
+    B, bodies = bodies_of(name, method)
+    close(bodies, B.F, mu)
+
+
+@pytest.mark.parametrize("contrast", [1e-3, 1e3])
+def test_stiffness_contrast(contrast):
+    B, bodies = bodies_of("T1_1", contrast=contrast)
+    close(bodies, B.F, 0.2)
+
+
+@pytest.mark.parametrize("mu", [0.2, 1.0])
+def test_push_close_to_the_limit(mu):
+    B, bodies = bodies_of("T1_1", "amg")
+    F, slave = B.F.copy(), B.pairs.pairs[:, 0]
+    F[3 * slave] += 0.99 * mu * -B.F.sum() / len(slave)
+    close(bodies, F, mu)
+
+
+def test_gaps():
+    B, bodies = bodies_of("T1_1")
+    gap = 10 * B.interface.length_scale * np.random.default_rng(0).random(len(B.pairs.pairs))
+    found = close(bodies, B.F, 0.3, gap)
+    assert 0 < found.state.report.n_open < len(gap)
+
+
+def test_other_methods_learn_from_newton():
+    B, bodies = bodies_of("T1_1h")
+    close(bodies, B.F, 0.2, method=solve_tresca_sequence)
+
+
+def tetrahedra(seed, n=4, quarter=False, bodies=2):
+    """Return stacked boxes of distorted TET4, held below (and on two planes), pressed and pushed above."""
+    rng = np.random.default_rng(seed)
+    axes = np.linspace(0, 1, n + 1)
+    grid = np.stack(np.meshgrid(axes, axes, axes, indexing="ij"), -1).reshape(-1, 3)
+    inside = ((grid > 0.01) & (grid < 0.99)).all(axis=1)
+    number = np.arange((n + 1) ** 3).reshape(n + 1, n + 1, n + 1)
+    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+    cube = np.stack([number[i : n + i, j : n + j, k : n + k].ravel() for i, j, k in corners], axis=1)
+    kuhn = [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)]
+    one = np.concatenate([cube[:, list(t)] for t in kuhn])
+    cells = [one + i * len(grid) for i in range(bodies)]
+    moved = np.where(inside[:, None], 0.2 / n * rng.uniform(-1, 1, (bodies, *grid.shape)), 0.0)
+    points = (grid + moved + np.arange(bodies)[:, None, None] * [0, 0, 1]).reshape(-1, 3)
+    D = isotropic(1e3, 0.3, "TRID")
+    whole = np.concatenate(cells)
+    K = assemble(len(points), 3, [(whole, element_stiffness(shape("TET4"), points[whole], D))])
+
+    def facets(block, z):
+        skin = boundary([("TET4", block)])["TRI3"].nodes
+        return [("TRI3", skin[np.abs(points[skin][:, :, 2] - z).max(axis=1) < 1e-9])]
+
+    pairs = joined([node_pairs(points, facets(cells[i], i), facets(cells[i - 1], i)) for i in range(1, bodies)])
+    dofs = [(3 * np.flatnonzero(points[:, 2] < 0.01)[:, None] + np.arange(3)).ravel()]
+    if quarter:
+        dofs += [3 * np.flatnonzero(points[:, i] < 1e-9) + i for i in (0, 1)]
+    dofs = np.unique(np.concatenate(dofs))
+    C = sp.csr_array((np.ones(len(dofs)), (np.arange(len(dofs)), dofs)), (len(dofs), 3 * len(points)))
+    F = np.zeros((len(points), 3))
+    top = (points[:, 2] > bodies - 0.01) & (points[:, 0] > 0.4)
+    F[top] = rng.uniform([-0.5, -0.4, -2.0], [0.5, 0.4, 0.0], (top.sum(), 3))
+    return points, K, pairs, reduce_conditions(C), F.ravel()
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("quarter", [False, True])
+@pytest.mark.parametrize("bodies", [2, 3])
+def test_tetrahedra_planes_of_symmetry_and_zones(seed, quarter, bodies, one_ring):
+    points, K, pairs, reduction, F = tetrahedra(seed, quarter=quarter, bodies=bodies)
+    tied = condense(K, pairs, reduction, points=points, method="amg" if seed == 1 else "auto")
+    found = close(tied, F, 0.05 if quarter else 0.4)
+    assert found.corrections > 1  # the small model is not the exact one here
+
+
+def test_small_model_is_stiffer_and_free_of_rigid_motions():
+    B, bodies = bodies_of("T1_1")
+    S = bodies.exact()
+    bodies.small()
+    difference = bodies.learned.S - S.S
+    assert np.linalg.eigvalsh(difference).min() > -1e-9 * S.kref
+    assert bodies.learned.rigid.shape == S.rigid.shape == (27, 6)
+    assert np.abs(bodies.learned.S @ S.rigid).max() < 1e-9 * S.kref
+    # forces of iterations do no work on rigid motions either
+    _, iterated = bodies_of("T1_1", "amg")
+    load = iterated.load(B.F)
+    np.testing.assert_allclose(S.rigid.T @ load.f, S.rigid.T @ bodies.load(B.F).f, atol=1e-11 * np.abs(load.f).max())
+
+
+def test_a_second_coefficient_starts_from_what_the_first_taught():
+    B, bodies = bodies_of("T1_1h")
+    load = bodies.load(B.F)
+    assert bodies.load(B.F) is load
+    gap = bodies.gaps(load)
+    counts = [
+        solve_corrected(bodies, load, gap, lambda i, mu=mu: solve_coulomb(i, mu)).corrections for mu in (0.2, 0.2)
+    ]
+    assert counts[1] == 1 < counts[0]
+
+
+def test_tied_bodies_are_recognised_without_any_model():
+    B, bodies = bodies_of("T1_1")
+    load = bodies.load(B.F)
+    gap = bodies.gaps(load)
+    law = Friction.of(len(gap), 1.0)
+    frame = bodies.interface_of(load, bodies.unloaded_stiffness(), gap)
+    assert tied_holds(frame, law, None)
+    assert not tied_holds(frame, Friction.of(len(gap), 0.05), None)
+    found = solve_on_bodies(
+        bodies, load, gap, law, lambda i: solve_coulomb(i, law), newton=None, exact=False, tied_first=True
+    )
+    assert found.corrections == 0
+    assert bodies.learned is None
+    exact = solve_coulomb(bodies.interface_of(load, bodies.exact(), gap), 1.0)
+    np.testing.assert_allclose(found.state.r, exact.r, atol=1e-12 * np.abs(exact.r).max())
+
+
+def test_stall_falls_back_on_the_exact_stiffness(monkeypatch):
+    """A model that cannot learn stalls; the exact stiffness takes over, and the reason is said."""
+    B, bodies = bodies_of("T1_1h")
+    load = bodies.load(B.F)
+    gap = bodies.gaps(load)
+    law = Friction.of(len(gap), 0.2)
+    monkeypatch.setattr(type(bodies.exact()), "learned", lambda self, dw, dy: self)
+    bodies._exact = None
+    monkeypatch.setattr("gibiane_ops.kernels.contact.correction.MOST", 3)
+    monkeypatch.setattr("gibiane_ops.kernels.contact.correction.AGREEMENT", 1e-13)
+    with pytest.raises(Stalled):
+        solve_corrected(bodies, load, gap, lambda i: solve_coulomb(i, law))
+    said = []
+    found = solve_on_bodies(
+        bodies, load, gap, law, lambda i: solve_coulomb(i, law), newton=None, exact=False, tied_first=True,
+        say=said.append,
+    )  # fmt: skip
+    assert found.exact
+    assert "3 corrections" in said[0]
+    bodies._exact = None
+    monkeypatch.setattr("gibiane_ops.kernels.contact.strategy.LONGEST", 0.0)
+    with pytest.raises(NotConverged):
+        solve_on_bodies(
+            bodies, load, gap, law, lambda i: solve_coulomb(i, law), newton=None, exact=False, tied_first=True
+        )
+
+
+def test_a_load_that_slides_is_refused_on_the_exact_stiffness():
+    B, bodies = bodies_of("T1_1")
+    F, slave = B.F.copy(), B.pairs.pairs[:, 0]
+    F[3 * slave] += 1.05 * 0.2 * -B.F.sum() / len(slave)
+    load = bodies.load(F)
+    law = Friction.of(len(slave), 0.2)
+    with pytest.raises(ContactUnbalanced):
+        solve_on_bodies(
+            bodies, load, bodies.gaps(load), law, lambda i: solve_coulomb(i, law), newton=None, exact=False,
+            tied_first=True,
+        )  # fmt: skip
+    assert bodies.is_exact
+
+
+def test_plan_by_size_and_memory(monkeypatch):
+    monkeypatch.setattr("gibiane_ops.kernels.contact.strategy.available_memory", lambda: 8e9)
+    assert plan(2_000, 100_000, 75, 3).exact
+    large = plan(1_170_000, 90_000_000, 1083, 3)
+    assert (large.method, large.exact) == ("amg", False)
+    assert large.memory < 8e9
+    assert plan(100_000, 8_000_000, 243, 3, wish="DIRE").method == "auto"
+    assert plan(100_000, 8_000_000, 243, 3, coordinates=False).exact
+    assert plan(100_000, 8_000_000, 243, 3, all_exact=True).exact
