@@ -16,10 +16,10 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 COARSEST = 400
 """Unknowns below which a level is solved by a dense inverse."""
 
-DEGREE = 2
+DEGREE = 3
 """Degree of the Chebyshev polynomial that smooths before and after the correction of the coarser level."""
 
-SMOOTHED = 8.0
+SMOOTHED = 20.0
 """The polynomial damps the eigenvalues between the largest one and the largest one over this number."""
 
 DEPENDENT = 1e-7
@@ -77,7 +77,7 @@ class Multigrid:
 
     Cost
     ----
-    Linear in the entries of A, in time and memory: setting up takes as long as some 150 products by A, a cycle as 6.
+    Linear in the entries of A, in time and memory: setting up takes as long as some 150 products by A, a cycle as 8.
     """
 
     def __init__(self, A: sp.sparray, near_null: FloatArray | None, block: int) -> None:

@@ -12,6 +12,7 @@ from gibiane.registry import Context, extend, operator
 from gibiane.values import FLOTTANT, MAILLAGE, POINT, Table
 from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.mesh import distances, unions
+from gibiane_ops.kernels.topology import used_nodes
 from gibiane_ops.mesh.building import LINES, explained, join, nodes_of, tolerance_of
 from gibiane_ops.values.champs import DIFFUS, INDETERMINE, ChPoint
 from gibiane_ops.values.maillage import Block, Maillage, Point
@@ -86,7 +87,7 @@ def _elim(ctx: Context, g1: Maillage | Point, g2: Maillage | Point | None, toler
     store = nodes_of(ctx)
     one = as_mesh(g1).nodes
     two = one if g2 is None else as_mesh(g2).nodes
-    limit = tolerance_of(ctx, tolerance, np.union1d(one, two))
+    limit = tolerance_of(ctx, tolerance, one if g2 is None else used_nodes([one, two]))
     with explained(ctx, "tolerance"):
         if g2 is None:
             pairs = one[distances.close_pairs(store.coords[one], limit)]
@@ -123,9 +124,9 @@ def _merge(ctx: Context, kept: IntArray, dropped: IntArray) -> None:
     store = nodes_of(ctx)
     for field in _fields(ctx.session.names().values(), set()):
         _check_field(ctx, field, kept, dropped)
-    before = len(np.unique(store.canonical(np.concatenate([kept, dropped]))))
+    before = len(used_nodes([store.canonical(kept), store.canonical(dropped)]))
     store.merge(kept, dropped)
-    after = len(np.unique(store.canonical(np.concatenate([kept, dropped]))))
+    after = len(used_nodes([store.canonical(kept), store.canonical(dropped)]))
     if ctx.option("ECHO") >= 1:
         ctx.write(f" {before - after} noeud(s) elimine(s)")
 

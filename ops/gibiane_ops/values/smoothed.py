@@ -12,6 +12,7 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotConverged
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.supports import moved
+from gibiane_ops.kernels.topology import used_nodes
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
@@ -79,7 +80,7 @@ def smoothed(
     if any(z.bars for z in model.zones):
         ctx.fail(251, "stresses of bars cannot be smoothed: a model of massive elements is wanted", at="model")
     for zones in solids_of(solid_zones(ctx, model)):
-        nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
+        nodes = used_nodes([z.cells for z in zones])
         points = store.coords[nodes][:, : zones[0].dim]
         blocks = []
         for zone in zones:

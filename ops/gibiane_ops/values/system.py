@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from gibiane.registry import Context
 from gibiane_ops.kernels.contact.law import Friction, friction, joined_laws
 from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, no_pairs
+from gibiane_ops.kernels.topology import used_nodes
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore, node_store
 from gibiane_ops.values.rigidite import ConditionPart, ContactPart, Rigidite
@@ -173,7 +174,7 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
     names = tuple(dict.fromkeys(n for part in rigidity.matrices for n in part.names))
     duals = tuple(dict.fromkeys(n for part in rigidity.matrices for n in part.duals))
     supports = [store.canonical(part.nodes) for part in rigidity.matrices]
-    nodes = np.unique(np.concatenate(supports))
+    nodes = used_nodes(supports)
     size = len(nodes) * len(names)
     K = sp.csr_array((size, size))
     for number, (part, support) in enumerate(zip(rigidity.matrices, supports, strict=True)):

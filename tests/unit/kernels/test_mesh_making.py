@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
 
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.elements.table import SHAPES, shape
@@ -358,6 +359,30 @@ def test_close_and_facing_pairs():
     assert distances.facing_pairs(points[:2], points[2:], 0.06).tolist() == [[1, 0], [0, 1]]
     with pytest.raises(BadValue):
         distances.close_pairs(points, -1.0)
+
+
+@pytest.mark.parametrize("kind", ["cloud", "plane", "line", "grid", "sphere", "crowd", "same"])
+@pytest.mark.parametrize("tolerance", [0.0, 1e-9, 1e-3, 0.3])
+def test_close_pairs_are_those_of_a_tree(kind, tolerance):
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-3, 5, (900, 3))
+    if kind == "plane":
+        points[:, 1] = 2.0
+    elif kind == "line":
+        points[:] = points[:, :1] * [1.0, 2.0, 0.0]
+    elif kind == "grid":
+        points = np.stack(np.meshgrid(*[np.arange(9.0)] * 3), -1).reshape(-1, 3) / 3
+    elif kind == "sphere":
+        points /= np.linalg.norm(points, axis=1)[:, None]
+    elif kind == "crowd":
+        points[100:] = points[0] + 1e-4 * rng.standard_normal((800, 3))
+    elif kind == "same":
+        points[:] = 1.0
+        points = points[:60]
+    points = np.concatenate([points, points[::3] + tolerance * rng.uniform(-0.6, 0.6, points[::3].shape)])
+    expected = np.sort(cKDTree(points).query_pairs(tolerance, output_type="ndarray"), axis=1)
+    expected = expected[np.lexsort((expected[:, 1], expected[:, 0]))]
+    np.testing.assert_array_equal(distances.close_pairs(points, tolerance), expected)
 
 
 def test_contours_and_sharp_edges_of_a_box():

@@ -9,6 +9,9 @@ from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.mesh.arcs import distance_to_axis
 from gibiane_ops.kernels.mesh.transforms import direction, normal_of
 
+CROWD = 40
+"""Points in one cell of the grid above which `close_pairs` makes the cells smaller."""
+
 
 def to_line(points: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the distances to the line through two points; all arrays (., 3), length."""
@@ -116,15 +119,70 @@ def close_pairs(points: FloatArray, tolerance: float) -> IntArray:
     ------
     BadValue
         The tolerance is negative.
-    """
-    from scipy.spatial import cKDTree
 
+    Cost
+    ----
+    One sort of the points, by the cells of a grid.
+    """
     if tolerance < 0:
         raise BadValue("distance", tolerance, "distance >= 0")
     if len(points) < 2:
         return np.zeros((0, 2), np.int64)
+    low = points.min(axis=0)
+    size = points.max(axis=0) - low
+    wide = size[size > 0]
+    # about one point a cell, more where they stand on surfaces: then the cells become smaller
+    cell = float((np.prod(wide / wide.max()) / len(points)) ** (1 / len(wide)) * wide.max()) if len(wide) else 0.0
+    for _ in range(6):
+        if cell < 8 * tolerance or not cell > 0 or float(np.log2(size / cell + 3).sum()) > 62:
+            break
+        found = _pairs_in_cells(points, (points - low) / cell, tolerance, tolerance / cell, size / cell)
+        if found is not None:
+            return found
+        cell /= 4
+    from scipy.spatial import cKDTree
+
     pairs = np.asarray(cKDTree(points).query_pairs(tolerance, output_type="ndarray"), np.int64).reshape(-1, 2)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+def _pairs_in_cells(
+    points: FloatArray, place: FloatArray, tolerance: float, margin: float, size: FloatArray
+) -> IntArray | None:
+    """Find close pairs among the points of each cell of a grid; None when a cell holds too many.
+
+    `place` and `size` are coordinates and extents counted in cells; a point nearer than `margin` to the border of its
+    cell stands in the neighbours too.
+    """
+    # twice the margin: round-off in `place` must not lose a pair
+    first = np.floor(place - 2 * margin).astype(np.int64) + 1
+    last = np.floor(place + 2 * margin).astype(np.int64) + 1
+    count = (size + 3).astype(np.int64)
+    step = np.r_[1, np.cumprod(count[:-1])]
+    keys, rows = [last @ step], [np.arange(len(points))]
+    border = np.flatnonzero((first != last).any(axis=1))
+    for corner in range(1, 2 ** points.shape[1]):
+        side = np.array([(corner >> i) & 1 for i in range(points.shape[1])], bool)
+        moved = border[(first[border] != last[border])[:, side].all(axis=1)]
+        keys.append(np.where(side, first[moved], last[moved]) @ step)
+        rows.append(moved)
+    key, row = np.concatenate(keys), np.concatenate(rows)
+    order = np.argsort(key)
+    key, row = key[order], row[order]
+    if len(key) > CROWD and (key[CROWD:] == key[:-CROWD]).any():
+        return None
+    found = []
+    for shift in range(1, CROWD + 1):
+        near = np.flatnonzero(key[shift:] == key[:-shift])
+        if not len(near):
+            break
+        a, b = row[near], row[near + shift]
+        gap = points[a] - points[b]
+        close = np.einsum("ij,ij->i", gap, gap) <= tolerance**2
+        found.append(np.minimum(a, b)[close] * len(points) + np.maximum(a, b)[close])
+    code = np.sort(np.concatenate([np.zeros(0, np.int64), *found]))
+    code = code[np.r_[True, code[1:] != code[:-1]][: len(code)]]
+    return np.stack(np.divmod(code, len(points)), axis=1)
 
 
 def facing_pairs(first: FloatArray, second: FloatArray, tolerance: float) -> IntArray:

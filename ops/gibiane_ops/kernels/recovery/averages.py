@@ -11,6 +11,7 @@ from gibiane_ops.kernels import assembly
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import NotConverged
 from gibiane_ops.kernels.recovery.blocks import StressBlock, centre_values, extrapolate
+from gibiane_ops.kernels.topology import used_nodes
 
 CG_TOLERANCE = 1e-13
 """Relative residual of the conjugate gradients of the projection."""
@@ -112,7 +113,7 @@ def project(points: FloatArray, blocks: Sequence[StressBlock], *, lumped: bool =
     ]
     b = assembly.assemble_vector(n_points, c, loads).reshape(n_points, c)
     M = sp.csr_matrix(assembly.assemble(n_points, 1, masses))
-    used = np.unique(np.concatenate([block.cells.ravel() for block in blocks]))
+    used = used_nodes([block.cells for block in blocks])
     nodal = np.zeros((n_points, c))
     if lumped:
         nodal[used] = b[used] / np.asarray(M.sum(axis=1)).reshape(n_points, 1)[used]

@@ -51,7 +51,7 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     n_points = len(points)
     whole = [(block.shape.name, block.cells) for block in blocks]
     mesh = topology.corner_blocks(whole)
-    used = np.unique(np.concatenate([corners.ravel() for _, corners in mesh]))
+    used = topology.used_nodes([corners for _, corners in mesh])
     inner, own = _patch_nodes(mesh, used, n_points)
     highest = np.full(n_points, 2 if degree is None else degree)
     for block in blocks:
