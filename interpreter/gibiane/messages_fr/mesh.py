@@ -45,7 +45,6 @@ MESH = {
     "a {type} cannot be moved": "un {type} ne se déplace pas",
     # selection
     "no element of the mesh is like that": "aucun élément du maillage n'est ainsi",
-    "'NOVE' accepts an empty result": "'NOVE' accepte un résultat vide",
     "the two points are one: nothing is between them": "les deux points n'en font qu'un : rien n'est entre eux",
     "this point is not on the line": "ce point n'est pas sur la ligne",
     "L POIN 'PROC' P gives the node of the line nearest to P": "L POIN 'PROC' P donne le noeud de la ligne le plus proche de P",
@@ -227,6 +226,5 @@ MESH = {
     "the sides have {counts} elements: opposite ones differ, and their sum is odd": "les côtés ont {counts} éléments : des côtés opposés diffèrent, et la somme est impaire",
     "give opposite sides as many elements, or change one side by one": "donner autant d'éléments aux côtés opposés, ou en changer un d'une unité",
     "the sides have {counts} elements: opposite ones must have as many on a curved surface": "les côtés ont {counts} éléments : sur une surface courbe les côtés opposés doivent en avoir autant",
-    "a mesh of TRI3 or TET4 is wanted, this one holds {shapes}": "il faut un maillage de TRI3 ou TET4, celui-ci contient {shapes}",
     "a mesh of points is wanted, this one holds {shapes}": "un maillage de points est attendu, celui-ci contient {shapes}",
 }

@@ -48,10 +48,10 @@ def choose(mesh: Maillage, rows: Sequence[Any]) -> Maillage:
     )
 
 
-def not_empty(ctx: Context, chosen: Maillage, allowed: bool, at: str = "g") -> Maillage:
-    """Refuse an empty choice unless it is allowed."""
+def not_empty(ctx: Context, chosen: Maillage, allowed: bool, at: str = "g", word: str = "NOVE") -> Maillage:
+    """Refuse an empty choice unless it is allowed, by the keyword `word`."""
     if chosen.n_cells == 0 and not allowed:
-        ctx.fail(26, "no element of the mesh is like that", at=at, hint="'NOVE' accepts an empty result")
+        ctx.fail(26, "no element of the mesh is like that", at=at, word=word, hint="'{word}' accepts an empty result")
     return chosen
 
 
@@ -233,11 +233,11 @@ def _in_volumes(
     margin = 0.01 if tolerance is None else tolerance
     if how == "BARYCENTRE":
         centres = [locate.in_mesh(x[b.cells].mean(axis=1), x, solids, margin) for b in g1.blocks]
-        return not_empty(ctx, choose(g1, centres), noid, "g1")
+        return not_empty(ctx, choose(g1, centres), noid, "g1", "NOID")
     flag = np.zeros(len(x), bool)
     flag[g1.nodes] = locate.in_mesh(x[g1.nodes], x, solids, margin)
     rows = [flag[b.cells].any(axis=1) if how == "LARGEMENT" else flag[b.cells].all(axis=1) for b in g1.blocks]
-    return not_empty(ctx, choose(g1, rows), noid, "g1")
+    return not_empty(ctx, choose(g1, rows), noid, "g1", "NOID")
 
 
 @INCL.form(Arg("g1", MAILLAGE, "mesh"), Arg("g2", MAILLAGE, "closed lines, or surface"), HOW, NOID, gives=[MAILLAGE])
@@ -262,12 +262,12 @@ def _in_contour(ctx: Context, g1: Maillage, g2: Maillage, how: str | None, noid:
             np.logical_or(*locate.in_contours(flat[b.cells].mean(axis=1), flat[lines[:, 0]], flat[lines[:, 1]]))
             for b in g1.blocks
         ]
-        return not_empty(ctx, choose(g1, rows), noid, "g1")
+        return not_empty(ctx, choose(g1, rows), noid, "g1", "NOID")
     nodes = g1.nodes
     inside, on = locate.in_contours(flat[nodes], flat[lines[:, 0]], flat[lines[:, 1]])
     flag = np.zeros(len(x), bool)
     flag[nodes] = inside & ~on if how == "STRICTEMENT" else inside | on
-    return not_empty(ctx, choose(g1, [flag[b.cells].all(axis=1) for b in g1.blocks]), noid, "g1")
+    return not_empty(ctx, choose(g1, [flag[b.cells].all(axis=1) for b in g1.blocks]), noid, "g1", "NOID")
 
 
 def _contour_of(g: Maillage) -> IntArray:

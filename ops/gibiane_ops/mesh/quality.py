@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import MAILLAGE
+from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.mesh import quality
 from gibiane_ops.mesh.building import nodes_of
+from gibiane_ops.mesh.degree import linear_mesh
 from gibiane_ops.values.champs import ChamZone, MChaml
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage
@@ -16,34 +20,61 @@ INDI = operator(
     "INDI",
     topic="mesh",
     summary="quality of the elements of a mesh",
-    notice="Of TRI3 or TET4, as a MCHAML with one value per element, or as a LISTREEL with that word: 'TOPO' from 0 "
-    "(flat) to 1 (equilateral); 'ASPE' the longest edge over the smallest height, 1 when equilateral; 'SKEW' from 0 "
-    "(equilateral) to 1 (flat).",
+    notice="A MCHAML with one value per element and a component per word, or with 'LISTREEL' a list. 'TOPO' from 0 "
+    "(flat) to 1: of triangles and tetrahedra the mean ratio (1 when equilateral); of QUA4, CUB8, PRI6 and PYR5 that "
+    "of the worst corner (1 for a square, a cube, a prism of equilateral bases as high as they are wide, a pyramid of "
+    "equal edges), 0 when a corner is turned inside out. Of TRI3 and TET4 also 'ASPE', the longest edge over the "
+    "smallest height, 1 when equilateral, and 'SKEW' from 0 (equilateral) to 1 (flat); of QUA4 'PLAN', 100 in a "
+    "plane, less when bent. Mid-nodes do not count.",
     example="OPTI DIME 2 ; T = MANU TRI3 (0. 0.) (1. 0.) (0.5 0.8) ; L = INDI 'TOPO' T 'LISTREEL' ; MESS (MINI L) ;",
     see=["MAILLER", "REMAILLER"],
 )
-MEASURES = {"TOPO": quality.mean_ratio, "ASPE": quality.aspect, "SKEW": quality.skewness}
+WORDS = ("TOPO", "ASPE", "SKEW", "PLAN")
+KNOWN = {
+    "TOPO": ("TRI3", "TET4", *quality.CORNERS),
+    "ASPE": ("TRI3", "TET4"),
+    "SKEW": ("TRI3", "TET4"),
+    "PLAN": ("QUA4",),
+}
 
 
 @INDI.form(
-    Key(tuple(MEASURES), "which measure", name="which", required=True),
+    Key(WORDS, "which measure", name="which", required=True),
+    Key(WORDS, "and further ones", name="more", repeat=True),
     Arg("g", MAILLAGE, "mesh"),
     Key("LISTREEL", "values as a list", name="listed"),
     gives=["MCHAML|LISTREEL"],
 )
-def _indi(ctx: Context, which: str, g: Maillage, listed: bool) -> MChaml | ListReel:
-    block = g.single()
-    if block is None or block.shape not in ("TRI3", "TET4"):
-        ctx.fail(
-            16,
-            "a mesh of TRI3 or TET4 is wanted, this one holds {shapes}",
-            at="g",
-            shapes=" ".join(g.shapes) or "no element",
-            hint="CHAN {wanted} cuts other elements",
-            wanted="TRI3",
-        )
-    values = MEASURES[which](nodes_of(ctx).coords[block.cells])
+def _indi(ctx: Context, which: str, more: list[str], g: Maillage, listed: bool) -> MChaml | ListReel:
+    words = list(dict.fromkeys([which, *more]))
+    if not g.blocks:
+        ctx.fail(26, "there is no element: the mesh is empty", at="g")
+    if listed and len(words) > 1:
+        ctx.fail(21, "a LISTREEL holds one measure, {count} are asked for", at="g", count=len(words))
+    linear = linear_mesh(ctx, g)
+    zones = []
+    for block, own in zip(linear.blocks, g.blocks, strict=True):
+        for word in words:
+            if block.shape not in KNOWN[word]:
+                ctx.fail(
+                    16,
+                    "'{word}' is a measure of {known}; this mesh holds {shapes}",
+                    at="g",
+                    word=word,
+                    known=" ".join(KNOWN[word]),
+                    shapes=" ".join(g.shapes),
+                    hint="CHAN cuts elements, ELEM chooses some",
+                )
+        x = nodes_of(ctx).coords[block.cells]
+        values = np.stack([_measure(word, block.shape, x, int(ctx.option("DIME"))) for word in words], axis=1)
+        zone = ModelZone(Maillage(g.store, [own]), "", (), str(ctx.option("MODE")))
+        zones.append(ChamZone(zone, words, values[:, None, :]))
     if listed:
-        return ListReel(values)
-    zone = ModelZone(Maillage(g.store, [block]), "", (), str(ctx.option("MODE")))
-    return MChaml([ChamZone(zone, [which], values[:, None, None])], "SCALAIRE", "GRAVITE")
+        return ListReel(np.concatenate([zone.values.ravel() for zone in zones]))
+    return MChaml(zones, "SCALAIRE", "GRAVITE")
+
+
+def _measure(word: str, name: str, x: FloatArray, dim: int) -> FloatArray:
+    if word == "TOPO":
+        return quality.corner_ratio(name, x[..., :dim]) if name in quality.CORNERS else quality.mean_ratio(x)
+    return {"ASPE": quality.aspect, "SKEW": quality.skewness, "PLAN": quality.flatness}[word](x)

@@ -22,6 +22,23 @@ PVEC = operator(
 )
 
 
+PMIX = operator(
+    "PMIXTE",
+    topic="geometry",
+    summary="mixed product of three vectors",
+    notice="`x = PMIX U V W`: the product of U by the vector product of V and W, in space.",
+    example="OPTI DIME 3 ; MESS (PMIX (1. 0. 0.) (0. 1. 0.) (0. 0. 2.)) ;",
+    see=["PVECTORIEL", "PSCAL"],
+)
+
+
+@PMIX.form(
+    Arg("u", POINT, "vector"), Arg("v", POINT, "second vector"), Arg("w", POINT, "third vector"), gives=[FLOTTANT]
+)
+def _pmix(ctx: Context, u: Point, v: Point, w: Point) -> float:
+    return float(u.coords @ np.cross(v.coords, w.coords))
+
+
 @extend("PSCAL").form(Arg("u", POINT, "vector"), Arg("v", POINT, "vector"), gives=[FLOTTANT])
 def _psca(ctx: Context, u: Point, v: Point) -> float:
     return float(u.coords @ v.coords)

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
+from gibiane_ops.kernels.elements.table import SHAPES
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
-from gibiane_ops.kernels.mesh import charts, curves, seams
+from gibiane_ops.kernels.mesh import charts, curves, levels, quality, seams
 
 Z = np.array([0.0, 0.0, 1.0])
 O = np.zeros(3)  # noqa: E741
@@ -104,3 +106,39 @@ def test_a_seam_fills_the_strip_once(m: int, n: int) -> None:
     assert len(cells) == m + n - 2
     assert (area > 0).all()
     assert area.sum() == pytest.approx(1.0 if m > 1 else 0.5)
+
+
+@pytest.mark.parametrize("name", ["TRI3", "TET4"])
+def test_levels_of_a_linear_field_are_plane_and_closed(name: str) -> None:
+    """The level of a linear field lies in its plane, looks to higher values, and its ends are on the boundary."""
+    dim = SHAPES[name].dim
+    rng = np.random.default_rng(4)
+    points = np.zeros((40, 3))
+    points[:, :dim] = rng.uniform(0, 1, (40, dim))
+    cells = np.asarray(Delaunay(points[:, :dim]).simplices, np.int64)
+    way = np.array([0.3, 0.5, 0.8 if dim == 3 else 0.0])
+    places, made = levels.level(points, cells, points @ way, 0.5 * way.sum())
+    assert np.allclose(places @ way, 0.5 * way.sum(), atol=1e-14)
+    X = places[made]
+    side = X[:, 1] - X[:, 0]
+    normal = np.cross(side, X[:, 2] - X[:, 0]) if dim == 3 else np.cross([0, 0, 1.0], side)
+    assert (normal @ way > -1e-16).all()
+    # inner edges (ends) of the level belong to two of its elements
+    ends = np.sort(made[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1) if dim == 3 else made.reshape(-1, 1)
+    _, count = np.unique(ends, axis=0, return_counts=True)
+    assert set(count.tolist()) <= {1, 2}
+
+
+@pytest.mark.parametrize("name", quality.PERFECT)
+def test_the_worst_corner_of_perfect_and_bad_elements(name: str) -> None:
+    ideal = quality.PERFECT[name]
+    Q, _ = np.linalg.qr(np.random.default_rng(2).standard_normal((ideal.shape[1],) * 2))
+    Q *= np.sign(np.linalg.det(Q)) if ideal.shape[1] == 3 else 1.0
+    if np.linalg.det(Q) < 0:
+        Q = Q[::-1]
+    turned = 7.0 * ideal @ Q.T
+    assert quality.corner_ratio(name, turned[None]) == pytest.approx([1.0])
+    mirrored = turned * np.array([-1.0, 1.0, 1.0])[: turned.shape[1]]
+    assert quality.corner_ratio(name, mirrored[None]) == pytest.approx([0.0])
+    stretched = quality.corner_ratio(name, (ideal * ([3.0] + [1.0] * (ideal.shape[1] - 1)))[None])
+    assert 0.1 < stretched[0] < 0.9

@@ -86,3 +86,81 @@ def skewness(X: FloatArray) -> FloatArray:
     radius = np.sqrt((weights * half).sum(axis=1))
     best = 3 * np.sqrt(3) / 4 * radius**2 if X.shape[1] == 3 else 8 * np.sqrt(3) / 27 * radius**3
     return np.asarray(np.where(flat, 1.0, 1.0 - _measure(X) / best), np.float64)
+
+
+# Corners whose three (two) edges leave it in order, and the shape that counts as perfect: unit square and cube, prism
+# of equilateral bases and unit height, pyramid of eight unit edges (its apex, where four edges meet, is left out).
+CORNERS: dict[str, tuple[tuple[int, ...], ...]] = {
+    "QUA4": ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
+    "CUB8": ((0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
+             (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3)),
+    "PRI6": ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
+    "PYR5": ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
+}  # fmt: skip
+_HALF, _HIGH, _UP = 0.5, np.sqrt(3) / 2, np.sqrt(0.5)
+_SQUARE = [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+_TRIANGLE = [[0.0, 0, 0], [1, 0, 0], [_HALF, _HIGH, 0]]
+PERFECT: dict[str, FloatArray] = {
+    "QUA4": np.array(_SQUARE)[:, :2],
+    "CUB8": np.array(_SQUARE + [[x, y, 1] for x, y, _ in _SQUARE]),
+    "PRI6": np.array(_TRIANGLE + [[x, y, 1] for x, y, _ in _TRIANGLE]),
+    "PYR5": np.array([*_SQUARE, [0.5, 0.5, _UP]]),
+}
+
+
+def corner_ratio(name: str, X: FloatArray) -> FloatArray:
+    """Compute the smallest mean ratio of the corners of quadrangles, cubes, prisms or pyramids.
+
+    Parameters
+    ----------
+    name : str
+        QUA4, CUB8, PRI6 or PYR5.
+    X : (m, n_nodes, dim) float64, length
+
+    Returns
+    -------
+    (m,) float64
+        From 0 (a corner is flat or turned inside out) to 1 (the perfect shape of `PERFECT`, of any size): at each
+        corner ``d det(T)^(2/d) / |T|^2``, where T maps the edges of the perfect corner onto those of the element.
+        Quadrangles in space have no sense of turning: their corners count as positive unless the element is folded.
+
+    Source
+    ------
+    P. M. Knupp, Algebraic mesh quality metrics for unstructured initial meshes, 2003.
+    """
+    worst = np.full(len(X), np.inf)
+    ideal = PERFECT[name]
+    d = ideal.shape[1]
+    normal = np.cross(X[:, 2] - X[:, 0], X[:, 3] - X[:, 1]) if d == 2 and X.shape[2] == 3 else None
+    for corner in CORNERS[name]:
+        edges = (X[:, corner[1:]] - X[:, corner[:1]]).swapaxes(1, 2)
+        T = edges @ np.linalg.inv((ideal[list(corner[1:])] - ideal[corner[0]]).T)
+        if d == T.shape[1]:
+            det = np.linalg.det(T)
+        else:
+            across = np.cross(T[:, :, 0], T[:, :, 1])
+            side = np.sign((across * normal).sum(axis=1)) if normal is not None else 1.0
+            det = np.linalg.norm(across, axis=1) * side
+        size = (T * T).sum(axis=(1, 2))
+        ratio = np.divide(d * np.maximum(det, 0.0) ** (2 / d), size, out=np.zeros(len(X)), where=size > 0)
+        worst = np.minimum(worst, ratio)
+    return np.asarray(worst, np.float64)
+
+
+def flatness(X: FloatArray) -> FloatArray:
+    """Compute how flat quadrangles are: 100 in a plane, 0 when folded back on themselves.
+
+    Parameters
+    ----------
+    X : (m, 4, 3) float64, length
+
+    Returns
+    -------
+    (m,) float64
+        ``100 (1 - angle / pi)``, the angle between the normals at two opposite corners.
+    """
+    one = np.cross(X[:, 1] - X[:, 0], X[:, 3] - X[:, 0])
+    two = np.cross(X[:, 3] - X[:, 2], X[:, 1] - X[:, 2])
+    sizes = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
+    cosine = np.divide((one * two).sum(axis=1), sizes, out=np.ones(len(X)), where=sizes > 0)
+    return np.asarray(100 * (1 - np.arccos(np.clip(cosine, -1, 1)) / np.pi), np.float64)
