@@ -97,14 +97,14 @@ CORNERS: dict[str, tuple[tuple[int, ...], ...]] = {
     "PRI6": ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
     "PYR5": ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
 }  # fmt: skip
-_HALF, _HIGH, _UP = 0.5, np.sqrt(3) / 2, np.sqrt(0.5)
-_SQUARE = [[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-_TRIANGLE = [[0.0, 0, 0], [1, 0, 0], [_HALF, _HIGH, 0]]
+_SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+_TRIANGLE = np.array([[0.0, 0, 0], [1, 0, 0], [0.5, np.sqrt(3) / 2, 0]])
+_UP = np.array([0.0, 0.0, 1.0])
 PERFECT: dict[str, FloatArray] = {
-    "QUA4": np.array(_SQUARE)[:, :2],
-    "CUB8": np.array(_SQUARE + [[x, y, 1] for x, y, _ in _SQUARE]),
-    "PRI6": np.array(_TRIANGLE + [[x, y, 1] for x, y, _ in _TRIANGLE]),
-    "PYR5": np.array([*_SQUARE, [0.5, 0.5, _UP]]),
+    "QUA4": _SQUARE[:, :2],
+    "CUB8": np.concatenate([_SQUARE, _SQUARE + _UP]),
+    "PRI6": np.concatenate([_TRIANGLE, _TRIANGLE + _UP]),
+    "PYR5": np.concatenate([_SQUARE, [[0.5, 0.5, np.sqrt(0.5)]]]),
 }
 
 
