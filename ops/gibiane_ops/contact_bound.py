@@ -76,6 +76,14 @@ def _bound_with_contact(
     zones = solid_zones(ctx, given.model)
     outside = exterior(ctx, zones, cl, pres, fsur)
     states = list(solved_contacts(ctx, given.contact, given.law, given.u, given.reaction))
+    if not all(state.pairs.plain.all() for state in states):
+        ctx.fail(
+            251,
+            "contact tractions in balance need surfaces whose nodes coincide; these have different meshes",
+            at="mc",
+            hint="mesh the contact surface once and copy it for the other solid; ERREUR 'CONTACT' without 'RDC' "
+            "estimates the error on any meshes",
+        )
     pieces = pieces_of(ctx, zones, np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)]))
     check_balance(ctx, pieces, stress, outside, volu, cl, [each for s in states for each in _forces(s)])
     sides = [cut_sides(ctx, pieces, outside)]
