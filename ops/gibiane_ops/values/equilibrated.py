@@ -8,7 +8,6 @@ from typing import NoReturn
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels import assembly
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
@@ -20,6 +19,7 @@ from gibiane_ops.kernels.estimate.tractions import Exterior
 from gibiane_ops.kernels.estimate.zz import SolidError
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.kernels.topology import group_by_nodes
+from gibiane_ops.values.balance import unbalanced
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.estimates import Guarantee, Parts
 from gibiane_ops.values.exterior import Side, held_at, held_directions
@@ -32,8 +32,6 @@ from gibiane_ops.values.pieces import ROUND_OFF, Pieces
 from gibiane_ops.values.rigidite import Rigidite
 
 GUARANTEED = Guarantee(True, "a stress in exact equilibrium with the loads: the error is not above this value")
-UNBALANCED = 1e-7
-"""Largest force left at a node, over the largest nodal force of an element."""
 
 
 def guarantee_of(ctx: Context, found: Admissible, doubt: str = "", coulomb: bool = False) -> Guarantee:
@@ -157,30 +155,9 @@ def check_balance(
     """
     if pieces.whole:
         return
-    store, zones = node_store(ctx), pieces.zones
-    dim, n = zones[0].dim, len(pieces.nodes)
-    points = store.coords[pieces.nodes][:, :dim]
-    force, scale = np.zeros((n, dim)), 0.0
-    for zone, cells in zip(zones, pieces.cells, strict=True):
-        of = shape(zone.shape)
-        values = moved(of, on_zone(ctx, stress, zone, "sig").values, stress.support, "STRESSES")
-        inner = assembly.internal_forces(of, points[cells], values)
-        scale = max(scale, float(np.abs(inner).max(initial=0.0)))
-        np.add.at(force, cells, -inner)
-        if volu is not None:
-            np.add.at(force, cells, assembly.distributed_load(of, points[cells], volu.coords[:dim]))
-    for side in sides:
-        places = np.searchsorted(pieces.nodes, side.facets.nodes)
-        np.add.at(force, places, np.matmul(assembly.face_mass(shape(side.facets.name), points[places]), side.traction))
-    for nodes, values in contact:
-        np.add.at(force, np.searchsorted(pieces.nodes, nodes), values)
-    known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
-    force -= np.einsum("nij,nj->ni", held_at(known, held, pieces.nodes), force)
-    size = np.linalg.norm(force, axis=1)
-    wrong = np.flatnonzero(size > UNBALANCED * scale)
-    if len(wrong):
-        worst = wrong[np.argsort(-size[wrong], kind="stable")]
-        _unbalanced(ctx, pieces.nodes[worst], force[worst])
+    nodes, forces = unbalanced(ctx, pieces.zones, stress, sides, volu, supports, contact)
+    if len(nodes):
+        _unbalanced(ctx, nodes, forces)
 
 
 def _aim(pieces: Pieces, mesh: Simplices, cells: IntArray, nodal: list[FloatArray], compliance: FloatArray) -> Aim:

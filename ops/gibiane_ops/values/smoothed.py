@@ -45,6 +45,37 @@ class Solid:
     nodal: FloatArray
 
 
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """What patches with equilibrium know of the loads.
+
+    Attributes
+    ----------
+    body : (dim,) float64, force / length^dim
+    zones : list of ModelZone
+        All the zones, in the order in which `surface` counts cells.
+    surface : recovery.Surface
+    """
+
+    body: FloatArray
+    zones: list[ModelZone]
+    surface: recovery.Surface
+
+    def surface_of(self, zones: list[ModelZone]) -> recovery.Surface:
+        """Return the facets of some zones, cells counted through these."""
+        place, start = np.full(sum(len(z.cells) for z in self.zones), -1), 0
+        for zone in zones:
+            first = 0
+            for other in self.zones:
+                if other is zone:
+                    place[first : first + len(zone.cells)] = np.arange(start, start + len(zone.cells))
+                first += len(other.cells)
+            start += len(zone.cells)
+        s = self.surface
+        here = np.flatnonzero(place[s.cell] >= 0)
+        return recovery.Surface(place[s.cell[here]], s.centre[here], s.normal[here], s.traction[here], s.known[here])
+
+
 def solids_of(zones: list[ModelZone]) -> list[list[ModelZone]]:
     """Group zones into solids: each is one, but zones of different elements that share nodes belong together.
 
@@ -68,14 +99,26 @@ def solids_of(zones: list[ModelZone]) -> list[list[ModelZone]]:
 
 
 def smoothed(
-    ctx: Context, model: Modele, stress: MChaml, method: str, given: MChaml | None = None, degree: int | None = None
+    ctx: Context,
+    model: Modele,
+    stress: MChaml,
+    method: str,
+    given: MChaml | None = None,
+    degree: int | None = None,
+    *,
+    pairs: IntArray | None = None,
+    balance: Balance | None = None,
 ) -> list[Solid]:
     """Smooth the stresses of every solid of a model, or take them from a field at the nodes that is `given`.
 
-    `degree` bounds that of the patches. Patches that miss terms for want of elements are told in a note.
+    `degree` bounds that of the patches. Patches that miss terms for want of elements are told in a note. With `pairs`
+    of nodes, (k, 2), the solids that they link are smoothed together, as if they were bonded; with `balance` patches
+    look at equilibrium.
     """
     store = node_store(ctx)
     solids = []
+    if pairs is not None:
+        return _together(ctx, model, stress, method, degree, pairs)
     fallbacks = flattened = 0
     if any(z.bars for z in model.zones):
         ctx.fail(251, "stresses of bars cannot be smoothed: a model of massive elements is wanted", at="model")
@@ -89,7 +132,10 @@ def smoothed(
             blocks.append(StressBlock(of, np.searchsorted(nodes, zone.cells), values))
         if given is None:
             try:
-                found = recovery.recover(points, blocks, method, degree)
+                if balance is None:
+                    found = recovery.recover(points, blocks, method, degree)
+                else:
+                    found = recovery.enriched_recovery(points, blocks, balance.body, balance.surface_of(zones))
             except NotConverged as failure:
                 ctx.fail(
                     997,
@@ -119,6 +165,25 @@ def smoothed(
             hint="two layers of elements or more, or LISSER 'MOYE'",
         )
     return solids
+
+
+def _together(
+    ctx: Context, model: Modele, stress: MChaml, method: str, degree: int | None, pairs: IntArray
+) -> list[Solid]:
+    """Smooth all the zones as one solid whose paired nodes are one."""
+    zones = solid_zones(ctx, model)
+    nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
+    known = pairs[np.isin(pairs, nodes).all(axis=1)]
+    name = np.arange(len(nodes))
+    name[np.searchsorted(nodes, known[:, 0])] = np.searchsorted(nodes, known[:, 1])
+    used, place = np.unique(name, return_inverse=True)
+    points = node_store(ctx).coords[nodes[used]][:, : zones[0].dim]
+    blocks = []
+    for zone in zones:
+        values = moved(shape(zone.shape), on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
+        blocks.append(StressBlock(shape(zone.shape), place[np.searchsorted(nodes, zone.cells)], values))
+    found = recovery.recover(points, blocks, method, degree)
+    return [Solid(zones, node_store(ctx).coords[nodes][:, : zones[0].dim], nodes, blocks, found.nodal[place])]
 
 
 def _given(

@@ -52,7 +52,7 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     whole = [(block.shape.name, block.cells) for block in blocks]
     mesh = topology.corner_blocks(whole)
     used = topology.used_nodes([corners for _, corners in mesh])
-    inner, own = _patch_nodes(mesh, used, n_points)
+    inner, own = patch_nodes(mesh, used, n_points)
     highest = np.full(n_points, 2 if degree is None else degree)
     for block in blocks:
         highest[block.cells] = np.minimum(highest[block.cells], block.shape.degree)
@@ -62,7 +62,7 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
 
     straight = all(block.shape.degree == 1 for block in blocks)
     graph = topology.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
-    weights = _lending(graph.astype(bool), used, inner, own)
+    weights = lending(graph.astype(bool), used, inner, own)
     shares = (weights + _middles(whole, n_points) @ weights).tocoo()
     node, patch = shares.coords
     fitted = shares.data[:, None] * fits.at(patch, points[node])
@@ -70,7 +70,7 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     return Recovered(np.asarray(total, np.float64), int(fits.failed.sum()), int(fits.flattened.sum()))
 
 
-def _patch_nodes(mesh: Sequence[Block], used: IntArray, n_points: int) -> tuple[IntArray, IntArray]:
+def patch_nodes(mesh: Sequence[Block], used: IntArray, n_points: int) -> tuple[IntArray, IntArray]:
     """Return the corners inside the solid, and these with the corners that need a patch of their own."""
     surface = np.concatenate([facets.nodes.ravel() for facets in topology.boundary(mesh).values()])
     inner = np.setdiff1d(used, surface)
@@ -88,7 +88,7 @@ def _edge_graph(mesh: Sequence[Block], n_points: int) -> sp.csr_array:
     return sp.csr_array(links + links.T + sp.eye_array(n_points, dtype=np.int32))
 
 
-def _lending(graph: sp.csr_array, used: IntArray, inner: IntArray, own: IntArray) -> sp.csr_array:
+def lending(graph: sp.csr_array, used: IntArray, inner: IntArray, own: IntArray) -> sp.csr_array:
     """Return the share of each patch in the value at each corner, (n_points, n_patches); rows of corners sum to 1."""
     n_points = graph.shape[0]
     patch = np.full(n_points, -1)
