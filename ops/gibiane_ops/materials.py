@@ -57,7 +57,8 @@ MATE = operator(
     "two axes) or 'RADIAL' P1 (P2: an axis in space; the first direction leaves it), turned by 'INCLINE' A "
     "degrees. Bars: YOUN, SECT (section). Contact: MU (friction coefficient), COHE (cohesion, added to MU times "
     "the pressure), SEUI (Tresca's bound), KT (stiffness of the elastic slip), EXPO VREF (Norton-Hoff), ADHE "
-    "(tension that surfaces in contact withstand before they come off for good), JEU (initial gap, instead of "
+    "(tension that surfaces in contact withstand before they come off for good; under a tension t the bound of "
+    "friction is COHE - MU t), JEU (initial gap, instead of "
     "the one of the geometry: 0. for curved surfaces in touch whose facets cross): numbers, or CHPOINT on the "
     "slave surface. A value is a number, or a CHPOINT or MCHAML, of which each element takes its mean.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 1 (0 0) (1 0)) TRAN 1 (0 1) ;\n"

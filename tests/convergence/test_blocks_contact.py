@@ -13,6 +13,7 @@ from gibiane_ops.kernels.contact.newton import solve_coulomb, solve_tied
 from gibiane_ops.kernels.contact.pairs import facets_of_body, node_pairs
 from gibiane_ops.kernels.contact.report import STICK
 from gibiane_ops.kernels.contact.status import solve_statuses
+from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
 from gibiane_ops.kernels.errors import ContactUnbalanced, SingularSystem
 
 ORACLE = json.loads((Path(__file__).parents[1] / "data" / "two_blocks.json").read_text(encoding="utf-8"))
@@ -108,6 +109,23 @@ def test_gamma_changes_the_path_only():
         assert found.iterations <= reference.iterations + 3
         np.testing.assert_allclose(found.r, reference.r, atol=1e-8 * interface.force_scale)
         np.testing.assert_allclose(found.w, reference.w, atol=1e-8 * interface.length_scale)
+
+
+@pytest.mark.parametrize("name", ["T1_1", "T1_2", "T2_1", "T3_1", "T4_2", "T4_4"])
+def test_few_newton_steps_on_every_type(name):
+    interface = blocks(name).interface
+    for mu in (0.0, 0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 1.0, 2.0):
+        state = solve_coulomb(interface, mu)
+        assert state.iterations <= 12
+        assert state.report.worst < 1e-8
+
+
+@pytest.mark.parametrize("name", ["T1_2h", "T2_1", "T2_1h", "T3_1h", "T4_4h"])
+def test_tresca_sequence_gives_the_solution_of_newton(name):
+    interface = blocks(name).interface
+    for mu in (0.1, 0.3):
+        exact, found = solve_coulomb(interface, mu), solve_tresca_sequence(interface, mu)
+        np.testing.assert_allclose(found.r, exact.r, atol=1e-6 * np.abs(exact.r).max())
 
 
 def test_warm_start_at_the_solution_has_nothing_to_do():

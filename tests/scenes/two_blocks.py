@@ -14,7 +14,7 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.topology import boundary
 
-SIDES = {"T1": 50.0, "T4": 200.0}
+SIDES = {"T1": 50.0, "T2": 100.0, "T3": 150.0, "T4": 200.0}
 
 
 def brick(low, high, n, start):
@@ -34,9 +34,9 @@ class Blocks:
         self.name = name
         family, level = name.rstrip("h").split("_")
         side, n = SIDES[family], int(level)
-        low, cells_low = brick(np.array([-100, -100, -200.0]), np.array([100, 100, 0.0]), 8 * n if side == 50 else n, 0)
+        low, cells_low = brick(np.array([-100, -100, -200.0]), np.array([100, 100, 0.0]), 8 * n if side < 200 else n, 0)
         half = side / 2
-        n_high = 2 * n if side == 50 else n
+        n_high = round(side / 25) * n if side < 200 else n
         high, cells_high = brick(np.array([-half, -half, 0.0]), np.array([half, half, side]), n_high, len(low))
         self.points = unit * np.vstack([low, high])
         self.side = unit * side

@@ -19,6 +19,7 @@ from gibiane_ops.kernels.contact.projected_cg import solve_projected_cg
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.contact.status import solve_statuses
 from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
+from gibiane_ops.kernels.errors import UnsupportedLaw
 from gibiane_ops.values.nodes import FloatArray
 
 # keyword and what it is; those of WITH_R take a number r, a multiple of the stiffness of the interface
@@ -107,6 +108,8 @@ class Method:
         """
         options: dict[str, Any] = {}
         if self.name == STATUSES:
+            if more.get("slip_origin") is not None:
+                raise UnsupportedLaw("the fixed point of statuses", "a single load step")
             closing, sticking, tolerance = self.thresholds
             options = {"closing_distance": closing, "sticking_distance": sticking, "tolerance": tolerance}
         else:

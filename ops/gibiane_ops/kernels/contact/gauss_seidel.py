@@ -15,6 +15,9 @@ from gibiane_ops.kernels.contact.outcome import PATIENCE, finished, physical_sta
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState
 
+_LOOSE = 1e-6
+"""Least stiffness of a pair in a sweep, over kref."""
+
 _CHECK = 5
 """Sweeps between two measures of the residual."""
 
@@ -106,8 +109,10 @@ class _Sweep:
         self.problem, self.n, self.d = problem, n, d
         self.columns = np.ascontiguousarray(problem.S.reshape(n * d, n, d).transpose(1, 0, 2))
         local = problem.S.reshape(n, d, n, d)[np.arange(n), :, np.arange(n)]
-        self.normal = local[:, 0, 0]
-        self.tangent = np.linalg.norm(local[:, 1:, 1:], ord=2, axis=(1, 2)) if d > 1 else np.ones(n)
+        # a pair alone on a free motion has no stiffness of its own: it moves far, which is what happens
+        self.normal = np.maximum(local[:, 0, 0], _LOOSE)
+        tangent = np.linalg.norm(local[:, 1:, 1:], ord=2, axis=(1, 2)) if d > 1 else np.ones(n)
+        self.tangent = np.maximum(tangent, _LOOSE)
         self.laws = [_pair(problem.law, i) for i in range(n)]
         self.g = -problem.f.copy()
 

@@ -1,0 +1,121 @@
+"""A contact method returns a solution of its law or says that it has none; it never depends on units."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from gibiane_ops.kernels.contact.interface import Interface, bare_interface
+from gibiane_ops.kernels.contact.law import friction
+from gibiane_ops.kernels.contact.report import ContactState
+from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged, StatusCycle
+from gibiane_ops.values.methods import Method
+
+SEEDS = st.integers(0, 2**32 - 1)
+EXACT = [
+    Method("NEWT"), Method("TRES"), Method("MULT"), Method("PROJ", max_iter=300), Method("AUGM", r=1.0),
+    Method("AUGM", r=1e3), Method("UZAW", r=1.0), Method("UZAW", r=1e4), Method("UZAW", r=1e-4, tolerance=1e-4, max_iter=50),
+    Method("BIPO", r=1.0, max_iter=300),
+]  # fmt: skip
+SPRINGS = [Method(name, r=r) for name in ("PENA", "PERT") for r in (1e-2, 1.0, 1e3)]
+FAILURES = (NotConverged, StatusCycle, ContactUnbalanced)
+
+
+def random_interface(seed: int, n: int, dim: int, *, gap: bool, loose: bool) -> Interface:
+    """Random stiffness, stiff or with one rigid motion along the surface, and a load of either sign."""
+    rng = np.random.default_rng(seed)
+    size = n * dim
+    A = rng.normal(size=(size, size)) / np.sqrt(size)
+    S = 0.3 * np.eye(size) + A @ A.T
+    if loose:
+        slide = np.tile(np.eye(dim)[1], n) / np.sqrt(n)
+        keep = np.eye(size) - np.outer(slide, slide)
+        S = keep @ S @ keep
+    f = rng.normal(size=size)
+    f[::dim] += 1.0
+    return bare_interface(S, f, dim, np.abs(rng.normal(size=n)) * gap)
+
+
+def attempt(method: Method, interface: Interface, mu: float) -> ContactState | None:
+    law = friction(interface.n_pairs, mu=mu)
+    try:
+        return method.solve(interface, law)
+    except FAILURES as failure:
+        assert failure.best is not None
+        return None
+
+
+def name_of(method: Method) -> str:
+    return method.title
+
+
+CASES = {
+    "seed": SEEDS, "n": st.integers(1, 6), "dim": st.sampled_from([2, 3]), "mu": st.floats(0, 1.5), "gap": st.booleans(),
+    "loose": st.booleans(),
+}  # fmt: skip
+SLOW = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.too_slow])
+
+
+@SLOW
+@given(**CASES)
+@pytest.mark.parametrize("method", EXACT, ids=name_of)
+def test_what_an_exact_method_returns_obeys_every_law(method, seed, n, dim, mu, gap, loose):
+    interface = random_interface(seed, n, dim, gap=gap, loose=loose)
+    state = attempt(method, interface, mu)
+    if state is None:
+        return
+    w, r = state.w, state.r
+    force = max(np.abs(r).max(), interface.force_scale)
+    length = max(np.abs(w).max(), force / interface.kref)
+    # what the report may say is 1e-5, or a hundred tolerances
+    limit = 2 * max(1e-5, 100 * (method.tolerance or 0))
+    near = limit * max(1.0, n)
+    opening, friction_force = interface.gap - w[:, 0], np.linalg.norm(r[:, 1:], axis=1)
+    assert np.abs(interface.S @ w.ravel() - interface.f - r.ravel()).max() <= near * force
+    assert opening.min() >= -near * length
+    assert r[:, 0].max() <= near * force
+    assert np.abs(r[:, 0] * opening).max() <= near * force * length
+    bound = -mu * r[:, 0]
+    assert (friction_force - bound).max() <= near * max(bound.max(), 1e-6 * force)
+    slip = np.linalg.norm(w[:, 1:], axis=1)
+    assert np.abs(bound * slip + (r[:, 1:] * w[:, 1:]).sum(axis=1)).max() <= near * force * length
+
+
+@SLOW
+@given(**CASES)
+@pytest.mark.parametrize("method", SPRINGS, ids=name_of)
+def test_what_a_penalty_returns_are_the_forces_of_its_springs(method, seed, n, dim, mu, gap, loose):
+    interface = random_interface(seed, n, dim, gap=gap, loose=loose)
+    state = attempt(method, interface, mu)
+    if state is None:
+        return
+    w, r = state.w, state.r
+    g = method.r * interface.kref
+    pressure = g * np.maximum(w[:, 0] - interface.gap, 0.0)
+    elastic = -g * w[:, 1:]
+    size = np.linalg.norm(elastic, axis=1)
+    cut = np.where(size > mu * pressure, mu * pressure / np.maximum(size, 1e-300), 1.0)
+    scale = 1e-7 * max(interface.force_scale, np.abs(r).max())
+    np.testing.assert_allclose(r, np.column_stack([-pressure, cut[:, None] * elastic]), atol=scale * max(1.0, method.r))
+    np.testing.assert_allclose(interface.S @ w.ravel(), interface.f + r.ravel(), atol=scale)
+    # it is far from the exact law as its penetration is, and says so
+    assert state.report.penetration >= 0.99 * (w[:, 0] - interface.gap).max(initial=0) / max(
+        np.abs(w).max(), max(np.abs(r).max(), interface.force_scale) / interface.kref
+    )
+
+
+@settings(deadline=None, max_examples=4)
+@given(SEEDS, st.floats(-9, 9), st.floats(-9, 9), st.floats(0.05, 0.6))
+@pytest.mark.parametrize("method", [*EXACT, *SPRINGS, Method("STATUT")], ids=name_of)
+def test_units_change_nothing(method, seed, force, length, mu):
+    a = random_interface(seed, 4, 3, gap=True, loose=False)
+    # powers of two leave every bit in place
+    F, L = 2.0 ** round(3 * force), 2.0 ** round(3 * length)
+    b = bare_interface(a.S * F / L, a.f * F, 3, a.gap * L)
+    one, other = attempt(method, a, mu), attempt(method, b, mu)
+    assert (one is None) == (other is None)
+    if one is not None and other is not None:
+        assert one.iterations == other.iterations
+        np.testing.assert_array_equal(one.status, other.status)
+        np.testing.assert_allclose(other.r, F * one.r, atol=1e-9 * F * a.force_scale)
+        np.testing.assert_allclose(other.w, L * one.w, atol=1e-9 * L * a.length_scale)
