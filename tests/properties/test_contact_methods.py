@@ -14,8 +14,8 @@ from gibiane_ops.values.methods import Method
 SEEDS = st.integers(0, 2**32 - 1)
 EXACT = [
     Method("NEWT"), Method("TRES"), Method("MULT"), Method("PROJ", max_iter=300), Method("AUGM", r=1.0),
-    Method("AUGM", r=1e3), Method("UZAW", r=1.0), Method("UZAW", r=1e4), Method("UZAW", r=1e-4, tolerance=1e-4, max_iter=50),
-    Method("BIPO", r=1.0, max_iter=300),
+    Method("AUGM", r=1e3), Method("UZAW", r=1.0), Method("UZAW", r=1e4),
+    Method("UZAW", r=1e-4, tolerance=1e-4, max_iter=50), Method("BIPO", r=1.0, max_iter=300),
 ]  # fmt: skip
 SPRINGS = [Method(name, r=r) for name in ("PENA", "PERT") for r in (1e-2, 1.0, 1e3)]
 FAILURES = (NotConverged, StatusCycle, ContactUnbalanced)
@@ -40,8 +40,7 @@ def attempt(method: Method, interface: Interface, mu: float) -> ContactState | N
     law = friction(interface.n_pairs, mu=mu)
     try:
         return method.solve(interface, law)
-    except FAILURES as failure:
-        assert failure.best is not None
+    except FAILURES:
         return None
 
 
@@ -50,8 +49,8 @@ def name_of(method: Method) -> str:
 
 
 CASES = {
-    "seed": SEEDS, "n": st.integers(1, 6), "dim": st.sampled_from([2, 3]), "mu": st.floats(0, 1.5), "gap": st.booleans(),
-    "loose": st.booleans(),
+    "seed": SEEDS, "n": st.integers(1, 6), "dim": st.sampled_from([2, 3]), "mu": st.floats(0, 1.5),
+    "gap": st.booleans(), "loose": st.booleans(),
 }  # fmt: skip
 SLOW = settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.too_slow])
 
