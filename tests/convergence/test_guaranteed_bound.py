@@ -14,7 +14,6 @@ import scipy.sparse as sp
 
 from gibiane_ops.kernels.assembly import assemble, element_stiffness, strains, stresses
 from gibiane_ops.kernels.constraints import reduce_conditions
-from gibiane_ops.kernels.contact.areas import nodal_areas
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
@@ -192,7 +191,7 @@ def test_slips_of_several_directions_leave_no_admissible_traction():
     # Nodes that slip all carry the bound times their area; their directions differ, so that no traction within the
     # bound has these nodal forces. It is told, not claimed.
     of = scene(100.0, 25.0, False)
-    area = nodal_areas(of.points, [("TRI3", of.slave)], of.pairs.pairs[:, 0])
+    area = of.pairs.area
     _, state = of.contact(friction(len(area), cohesion=0.2 * area))
     assert (np.linalg.norm(state.w[:, 1:], axis=1) > 1e-9).sum() > 4
     found = of.tractions(state, threshold=0.2)

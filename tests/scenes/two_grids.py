@@ -1,7 +1,7 @@
 """Scene of two flat surfaces that face each other with different meshes, alone or as faces of elastic boxes."""
 
 import numpy as np
-from tests.scenes.two_blocks import brick
+from two_blocks import brick
 
 from gibiane_ops.kernels.assembly import assemble, element_mass, element_stiffness
 from gibiane_ops.kernels.elements.table import shape

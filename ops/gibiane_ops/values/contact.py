@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 import scipy.sparse as sp
@@ -62,6 +63,13 @@ def zone_pairs(ctx: Context, zone: ContactZone, at: str) -> ContactPairs:
     """Return the pairs of a contact zone in nodes of the session (G401, G402 when there are none)."""
     points = node_store(ctx).coords[:, : int(ctx.option("DIME"))]
     axis = family(ctx) == "AXIS"
+    # RIGI, COFR and ERREUR ask in turn: the pairs are kept until the nodes move
+    used = np.concatenate([zone.slave.nodes, zone.master.nodes])
+    key = (axis, used.tobytes(), points[used].tobytes())
+    cache: dict[int, Any] = ctx.state.setdefault("contact pairs", {})
+    known = cache.get(id(zone))
+    if known is not None and known[:2] == (zone, key):
+        return cast(ContactPairs, known[2])
     with worded(ctx, at=at):
         try:
             pairs = _pairs(ctx, points, zone, axis, at)
@@ -78,6 +86,7 @@ def zone_pairs(ctx: Context, zone: ContactZone, at: str) -> ContactPairs:
             total=len(pairs.pairs),
             hint="facets turn so that normals leave their solid: take them with FACE or ENVE, or turn one with ORIE",
         )
+    cache[id(zone)] = zone, key, pairs
     return pairs
 
 

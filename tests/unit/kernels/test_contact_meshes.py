@@ -1,9 +1,11 @@
 """Contact of surfaces of different meshes: mortar, node to facet, search, ties."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from tests.scenes.two_grids import areas, grid, turned
+from two_grids import areas, grid, turned
 
 from gibiane_ops.kernels.contact.clip import clip, fan
 from gibiane_ops.kernels.contact.facets import middles_of, surface_of, transformation
@@ -13,7 +15,7 @@ from gibiane_ops.kernels.contact.overlaps import overlaps
 from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, node_pairs
 from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.errors import EmptyContact
+from gibiane_ops.kernels.errors import BadValue, EmptyContact
 
 KINDS = ["TRI3", "QUA4", "TRI6", "QUA8"]
 NONE = np.zeros(0, np.int64)
@@ -400,3 +402,16 @@ def test_nested_meshes_are_different_meshes() -> None:
     pairs = node_pairs(points, slave, master)
     assert len(pairs.pairs) == 9
     assert not are_inside(points, pairs.unpaired_slave, slave, master)
+
+
+def test_a_corner_of_obstacles_shares_the_displacement() -> None:
+    """A node before two rigid walls: one component each, and none where the walls lean."""
+    normals = np.array([[0.0, -1.0], [-1.0, 0.0], [0.0, -1.0]])
+    pairs = ContactPairs(
+        np.array([[0, -1], [0, -1], [1, -1]]), normals, np.zeros(3), np.zeros((3, 2)), np.array([0, 1, 0]), *[NONE] * 4
+    )
+    free = check_tie(pairs, 2, 2, NONE)
+    np.testing.assert_array_equal(free, [[False, True], [True, False], [True, True]])
+    lean = np.array([[0.0, -1.0], [-0.8, -0.6], [0.0, -1.0]])
+    with pytest.raises(BadValue):
+        check_tie(replace(pairs, normals=lean), 2, 2, NONE)

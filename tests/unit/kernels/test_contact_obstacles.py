@@ -6,8 +6,8 @@ import scipy.sparse as sp
 
 from gibiane_ops.kernels.assembly import assemble, element_stiffness
 from gibiane_ops.kernels.constraints import reduce_conditions
-from gibiane_ops.kernels.contact.areas import nodal_areas
 from gibiane_ops.kernels.contact.condense import condense
+from gibiane_ops.kernels.contact.facets import integrals, surface_of
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
@@ -153,4 +153,4 @@ def test_interface_too_large_for_the_memory():
 def test_areas_of_nodes():
     points = np.array([[0, 0, 0], [2, 0, 0], [2, 3, 0], [0, 3, 0], [4, 0, 0.0]])
     facets = [("QUA4", np.array([[0, 1, 2, 3]])), ("TRI3", np.array([[1, 4, 2]]))]
-    np.testing.assert_allclose(nodal_areas(points, facets, np.array([0, 1, 4])), [1.5, 2.5, 1.0])
+    np.testing.assert_allclose(integrals(points, surface_of(points, facets))[[0, 1, 4]], [1.5, 2.5, 1.0])

@@ -56,8 +56,8 @@ def tie_contact(
     """
     plain = contact.plain
     if plain.all():
-        return tie(n_dofs, d, contact.pairs, fixed)
-    Bv, part, B0, free_plain = tie(n_dofs, d, contact.pairs[plain], fixed)
+        return tie(n_dofs, d, contact.pairs, fixed, _shared(n_dofs, d, contact, fixed))
+    Bv, part, B0, free_plain = tie(n_dofs, d, contact.pairs[plain], fixed, _shared(n_dofs, d, contact, fixed)[plain])
     n = len(plain)
     free = np.zeros((n, d), dtype=bool)
     free[plain] = free_plain
@@ -67,6 +67,29 @@ def tie_contact(
     place = np.flatnonzero(np.repeat(~plain, d))
     slave = (d * contact.pairs[~plain, :1] + np.arange(d)).ravel()
     return *_interpolated(rows, place, slave, contact.normals[~plain], Bv, Bw, B0, free), free
+
+
+def _shared(n_dofs: int, d: int, contact: ContactPairs, fixed: IntArray) -> BoolArray:
+    """Share out the displacement of nodes that lie in a corner of obstacles: each pair has its normal alone.
+
+    What slides along one obstacle moves towards the other; friction of these nodes is left out. Obstacles that are not
+    along the axes stay as they are, and are refused.
+    """
+    left_out = np.zeros(contact.normals.shape, dtype=bool)
+    held = np.zeros(n_dofs + d, dtype=bool)
+    held[fixed] = True
+    held[n_dofs:] = True
+    master = np.where(contact.pairs[:, 1] < 0, n_dofs // d, contact.pairs[:, 1])
+    still = held[d * master[:, None] + np.arange(d)].all(axis=1) & contact.plain
+    axis = np.abs(contact.normals).argmax(axis=1)
+    along = still & (np.abs(contact.normals).max(axis=1) > 1 - NONE)
+    nodes, count = np.unique(contact.pairs[still, 0], return_counts=True)
+    for node in nodes[count > 1]:
+        mine = np.flatnonzero(still & (contact.pairs[:, 0] == node))
+        if along[mine].all() and len(np.unique(axis[mine])) == len(mine):
+            left_out[mine] = True
+            left_out[mine, axis[mine]] = False
+    return left_out
 
 
 def _interpolated(
@@ -190,7 +213,7 @@ def _dependent(nodes: IntArray) -> BadValue:
 
 
 def tie(
-    n_dofs: int, d: int, pairs: IntArray, fixed: IntArray
+    n_dofs: int, d: int, pairs: IntArray, fixed: IntArray, left_out: BoolArray | None = None
 ) -> tuple[sp.csr_array, sp.csr_array, sp.csr_array, BoolArray]:
     """Write every displacement as ``U = Bv v + Bw w + B0 values``, w in global components.
 
@@ -202,6 +225,8 @@ def tie(
         Slave and master nodes; a master of -1 is the ground, which does not move.
     fixed : (n_fixed,) int64
         Unknowns that are prescribed.
+    left_out : (n, d) bool, optional
+        Components of w that do not count.
 
     Returns
     -------
@@ -225,13 +250,15 @@ def tie(
         # the ground is one more node, prescribed; its unknowns are the last
         ground = n_dofs + np.arange(d)
         whole = np.where(pairs < 0, n_dofs // d, pairs)
-        Bv, Bw, B0, free = tie(n_dofs + d, d, whole, np.concatenate([fixed, ground]))
+        Bv, Bw, B0, free = tie(n_dofs + d, d, whole, np.concatenate([fixed, ground]), left_out)
         return Bv[:n_dofs], Bw[:n_dofs], B0[:n_dofs, : len(fixed)], free
     component = np.arange(d)
     slave, master = (d * pairs[:, :1] + component).ravel(), (d * pairs[:, 1:] + component).ravel()
     known = np.zeros(n_dofs, dtype=bool)
     known[fixed] = True
     free = ~(known[slave] & known[master])
+    if left_out is not None:
+        free &= ~left_out.ravel()
     group, has_fixed = _groups(n_dofs, slave[free], master[free], fixed)
     _refuse_loops(group, slave[free], has_fixed, fixed, d)
     roots = np.full(len(has_fixed), n_dofs)
