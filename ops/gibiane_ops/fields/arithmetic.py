@@ -158,6 +158,24 @@ def _union_of_elements(ctx: Context, a: MChaml, b: MChaml, more: list[MChaml]) -
     return total
 
 
+@extend("ATG").form(Arg("y", CHPOINT, "ordinates"), Arg("x", CHPOINT, "abscissae"), gives=[CHPOINT])
+def _angle(ctx: Context, y: ChPoint, x: ChPoint) -> Field:
+    return _angles(ctx, y, x)
+
+
+@extend("ATG").form(Arg("y", MCHAML, "ordinates"), Arg("x", MCHAML, "abscissae"), gives=[MCHAML])
+def _angle_of_elements(ctx: Context, y: MChaml, x: MChaml) -> Field:
+    return _angles(ctx, y, x)
+
+
+def _angles(ctx: Context, y: Field, x: Field) -> Field:
+    """Return the angles of directions, in degrees."""
+    try:
+        return combined(y, x, lambda a, b: np.degrees(np.arctan2(a, b)))
+    except Incompatible as failure:
+        refused(ctx, failure, "x")
+
+
 FUNCTIONS: dict[str, tuple[Callable[[FloatArray], FloatArray], Callable[[FloatArray], Any] | None]] = {
     "ABS": (np.abs, None),
     "SIGNE": (np.sign, None),
