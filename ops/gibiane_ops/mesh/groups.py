@@ -21,7 +21,7 @@ SIMPLEX = {1: "POI1", 2: "SEG2", 3: "TRI3", 4: "TET4"}
 class Groups:
     """The groups of a table as kernels take them: names and elements by ranks of nodes.
 
-    A contact face that is not one of the groups is added under a name of its own.
+    A contact face that is not one of the groups is added under a name of its own. Numbers and texts are copied.
     """
 
     def __init__(self, ctx: Context, table: Table, nodes: IntArray, shapes: dict[int, str] = SIMPLEX) -> None:
@@ -34,9 +34,13 @@ class Groups:
         self.quadratic: set[str] = set()
         self.pairs: list[tuple[str, str]] = []
         self.pair_keys: list[Any] = []
+        self.others: list[tuple[Any, Any]] = []
         values: dict[int, str] = {}
         for index, value in table.entries.values():
             if index in ("PAIRES", "SOUSTYPE", "ARBRE"):
+                continue
+            if isinstance(value, bool | int | float | str):
+                self.others.append((index, value))
                 continue
             name = f"{index!r}"
             self._add(name, index, value)
@@ -129,6 +133,8 @@ class Groups:
                 continue
             group = made[name]
             table.set(index, Point(group.store, int(group.nodes[0])) if name in self.points else group)
+        for index, value in self.others:
+            table.set(index, value)
         if self.pairs:
             pairs = Table()
             for index, (first, second) in zip(self.pair_keys, self.pairs, strict=True):
