@@ -11,6 +11,7 @@ from gibiane.registry import Context
 from gibiane_ops.kernels.constraints import Reduction
 from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution
 from gibiane_ops.kernels.contact.correction import Corrected
+from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.kernels.contact.report import ContactState
@@ -79,6 +80,9 @@ def run_on_bodies(
     options: dict[str, Any] = {"start": start, "slip_origin": slip_origin}
     plain = method.name == "NEWT" and start is None
 
+    def again(interface: Interface, before: ContactState) -> ContactState:
+        return method.solve(interface, law, start=before, slip_origin=slip_origin)
+
     def say(text: str) -> None:
         progress.clear()
         if echo:
@@ -88,7 +92,8 @@ def run_on_bodies(
         prepared.bodies, load, gap, law,
         lambda interface: method.solve(interface, law, **options),
         newton=None if method.name == "NEWT" else lambda interface: method.solve_exact(interface, law, slip_origin),
-        exact=exact or prepared.way.exact, tied_first=plain, slip_origin=slip_origin, tell=progress.tell, say=say,
+        again=again if method.name == "NEWT" else None, exact=exact or prepared.way.exact,
+        tied_first=plain, slip_origin=slip_origin, tell=progress.tell, say=say,
     )  # fmt: skip
     progress.clear()
     if echo and not found.exact:

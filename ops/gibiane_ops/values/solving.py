@@ -2,35 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
+import numpy as np
 import scipy.sparse as sp
 
 from gibiane.registry import Context
+from gibiane_ops.kernels.memory import available_memory
 from gibiane_ops.kernels.rigid import FreeMotion, free_motions
 from gibiane_ops.kernels.solve import Factor
 from gibiane_ops.values.nodes import node_store
-from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.rigidite import ConditionPart, MatrixPart, Rigidite
 from gibiane_ops.values.system import System
 
 ELASTIC = (("UX", "UY"), ("UX", "UY", "UZ"))
 """Unknowns of systems that know rigid motions."""
 
+SPARE = 2e9
+"""Free memory, bytes, below which only one result is kept at all."""
+
 
 def kept(ctx: Context, kind: str, k: Rigidite, extra: Hashable, make: Callable[[], Any]) -> Any:
     """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
 
-    One result of each kind is kept: a factor of a large model fills most of the memory.
+    Matrices made anew are recognised by their entries. One result of each kind is kept, and only for the last
+    matrices: a factor of a large model fills most of the memory.
     """
     cache: dict[str, Any] = ctx.state.setdefault("factors", {})
-    parts = [*k.matrices, *k.conditions]
-    key = (node_store(ctx).version, extra, *(id(part) for part in parts))
+    version, parts = node_store(ctx).version, [*k.matrices, *k.conditions]
     found = cache.get(kind)
-    if found is None or found[0] != key:
+    if found is not None and found[0] == version and found[1] == extra and _same_parts(found[2], parts):
+        return found[3]
+    del found
+    cache.pop(kind, None)
+    for other in [name for name, entry in cache.items() if not _shared(entry[2], parts)]:
+        del cache[other]
+    if available_memory() < SPARE:
         cache.clear()
-        found = cache[kind] = key, parts, make()  # the parts stay alive, so that their ids are not used again
-    return found[2]
+    made = make()
+    cache[kind] = version, extra, parts, made  # the parts stay alive, so that theirs are no copies of other objects
+    return made
+
+
+def _shared(a: Sequence[Any], b: Sequence[Any]) -> bool:
+    """Tell whether two lists of parts hold the same matrices."""
+    one, two = ([part for part in parts if isinstance(part, MatrixPart)] for parts in (a, b))
+    return _same_parts(one, two)
+
+
+def _same_parts(a: Sequence[Any], b: Sequence[Any]) -> bool:
+    return len(a) == len(b) and all(_same(one, two) for one, two in zip(a, b, strict=True))
+
+
+def _same(a: Any, b: Any) -> bool:
+    """Compare two matrices or conditions by what they hold; the nodes of multipliers do not matter."""
+    if a is b:
+        return True
+    if isinstance(a, MatrixPart) and isinstance(b, MatrixPart):
+        A, B = sp.csr_array(a.matrix), sp.csr_array(b.matrix)
+        return (
+            (a.names, a.duals, a.symmetric, A.nnz) == (b.names, b.duals, b.symmetric, B.nnz)
+            and np.array_equal(a.nodes, b.nodes)
+            and all(np.array_equal(getattr(A, name), getattr(B, name)) for name in ("indptr", "data", "indices"))
+        )
+    if isinstance(a, ConditionPart) and isinstance(b, ConditionPart):
+        arrays = ("row", "node", "name", "coefficients")
+        return a.sense == b.sense and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in arrays)
+    return False
 
 
 def tell_notes(ctx: Context, solver: Factor) -> None:

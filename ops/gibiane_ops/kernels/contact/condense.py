@@ -25,7 +25,7 @@ from gibiane_ops.kernels.contact.small_model import SmallModel, interpolation, s
 from gibiane_ops.kernels.contact.tied import TiedSolver, tied_solver
 from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.errors import SingularSystem, TooLarge
-from gibiane_ops.kernels.solve import Factor
+from gibiane_ops.kernels.solve import ITERATIVE, Factor
 
 BoolArray = NDArray[np.bool_]
 
@@ -345,7 +345,7 @@ def condense(
     KBw = sp.csr_array(K @ fields.Bw)
     Kvw = sp.csr_array(fields.Bv.T @ KBw)
     try:
-        roots = fields.roots() if method in ("amg", "cg") else None
+        roots = fields.roots() if method in ITERATIVE else None
         tied = tied_solver(sp.csr_array(fields.Bv.T @ K @ fields.Bv), method=method, roots=roots, points=points)
     except SingularSystem as error:
         moving = np.unique(fields.Bv[:, error.unknowns].nonzero()[0])

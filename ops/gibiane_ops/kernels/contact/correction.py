@@ -29,6 +29,7 @@ PATIENCE = 8
 """Corrections in a row without halving the best difference after which the loop is given up."""
 
 Run = Callable[[Interface], ContactState]
+Again = Callable[[Interface, ContactState], ContactState]
 Failure = (NotConverged, StatusCycle, ContactUnbalanced)
 
 
@@ -103,6 +104,7 @@ def solve_corrected(
     gap: FloatArray,
     run: Run,
     *,
+    again: Again | None = None,
     tell: Callable[[int, float], None] | None = None,
 ) -> Corrected:
     """Solve contact on the small model, correct its forces by a solution with the tied matrix, and again.
@@ -115,6 +117,8 @@ def solve_corrected(
     gap : (n,) float64
     run : callable
         Any method: from an interface to a state; each pass runs it anew.
+    again : callable, optional
+        The method from the state before, for the passes after the first; their steps are added to its history.
     tell : callable, optional
         Called with the number of the correction and the relative difference of the forces.
 
@@ -147,11 +151,17 @@ def solve_corrected(
     size = len(load.f)
     w, x, y = np.zeros(size), np.zeros(len(load.x)), np.zeros(size)
     differences: list[float] = []
+    before: ContactState | None = None
     while True:
         learned = bodies.learned
         f = load.f if bodies.tied.direct else learned.still(learned.S @ w - y) + load.f
         interface = replace(bodies.interface_of(load, learned, gap), f=f)
-        state = run(interface)
+        if again is None or before is None:
+            state = run(interface)
+        else:
+            state = again(interface, before)
+            state = replace(state, history=[*before.history, *state.history])
+        before = state
         new_w = state.w.ravel()
         x, y_new = _true_force(bodies, new_w, w, x, y)
         bodies.learned = learned.learned(new_w - w, y_new - y)

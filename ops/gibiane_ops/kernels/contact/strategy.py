@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.choice import MEMORY_SHARE, direct_memory, iterative_memory
+from gibiane_ops.kernels.choice import Choice, choose, direct_memory
 from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution, interface_memory
 from gibiane_ops.kernels.contact.correction import (
+    Again,
     Corrected,
     Failure,
     Run,
@@ -22,7 +23,6 @@ from gibiane_ops.kernels.contact.correction import (
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.errors import NotConverged
-from gibiane_ops.kernels.memory import available_memory
 
 SMALL = 10_000
 """Tied unknowns up to which the exact stiffness costs no more than the small model."""
@@ -30,8 +30,8 @@ SMALL = 10_000
 FEW = 24
 """Components of w up to which back substitutions cost no more than the small model."""
 
-LARGE = 300_000
-"""Tied unknowns in space above which multigrid replaces the factor."""
+PASSES = 8
+"""Solutions with the tied matrix that a contact problem is expected to take."""
 
 LONGEST = 900.0
 """Seconds of back substitutions that a fallback may take."""
@@ -44,7 +44,7 @@ class Plan:
     Attributes
     ----------
     method : str
-        ``auto`` (a factor) or ``amg``, see ``factorize``.
+        ``auto`` or ``single`` (a factor) or ``amg``, see ``factorize``.
     exact : bool
         Exact stiffness at once.
     memory : float
@@ -89,16 +89,16 @@ def plan(
     -------
     Plan
     """
-    room = MEMORY_SHARE * available_memory()
-    multigrid = dim == 3 and coordinates
-    direct = wish == "DIRE" or not multigrid or (wish != "ITER" and n <= LARGE and direct_memory(n, dim) <= room)
-    exact = all_exact or not coordinates or (direct and (n <= SMALL or components <= FEW or dim == 2))
-    tied = direct_memory(n, dim) if direct else iterative_memory(entries)
-    memory = tied + interface_memory(components // dim, dim) + (0.0 if exact else 12.0 * entries)
+    exact = all_exact or not coordinates or n <= SMALL or components <= FEW or dim == 2
+    choice = choose(n, entries, dim, components if exact else PASSES, wish=wish, elastic=coordinates and dim == 3)
+    direct = choice.direct
+    if not direct and not coordinates:
+        choice, direct = Choice("auto", direct_memory(n, dim), True), True
+    memory = choice.memory + interface_memory(components // dim, dim) + (0.0 if exact else 12.0 * entries)
     # a factor takes about n^2 operations in space, each of its solutions the square root of that in order of n^(4/3)
     once = (30.0 * n ** (4 / 3) if dim == 3 else 10.0 * n * np.log2(max(n, 2))) if direct else 60.0 * entries
     setup = (20.0 * n**2 if dim == 3 else 10.0 * n**1.5) if direct else 400.0 * entries
-    return Plan("auto" if direct else "amg", exact, memory, setup + once * (components if exact else 8))
+    return Plan(choice.method, exact, memory, setup + once * (components if exact else PASSES))
 
 
 def solve_on_bodies(
@@ -109,6 +109,7 @@ def solve_on_bodies(
     run: Run,
     *,
     newton: Run | None,
+    again: Again | None = None,
     exact: bool,
     tied_first: bool,
     slip_origin: FloatArray | None = None,
@@ -127,6 +128,8 @@ def solve_on_bodies(
         The method.
     newton : callable or None
         Run first on the small model when the method is another: it learns the most for the least.
+    again : callable, optional
+        See ``solve_corrected``.
     exact : bool
         From the plan.
     tied_first : bool
@@ -153,7 +156,7 @@ def solve_on_bodies(
         try:
             if newton is not None:
                 solve_corrected(bodies, load, gap, newton, tell=tell)
-            return solve_corrected(bodies, load, gap, run, tell=tell)
+            return solve_corrected(bodies, load, gap, run, again=again, tell=tell)
         except (Stalled, *Failure) as failure:
             seconds = bodies.n_components * bodies.tied.seconds / (8 if bodies.tied.direct else 1)
             stalled = isinstance(failure, Stalled)

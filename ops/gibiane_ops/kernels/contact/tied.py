@@ -8,9 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.packages import DIRECT
 from gibiane_ops.kernels.rigid import rigid_modes
-from gibiane_ops.kernels.solve import Factor, factorize
+from gibiane_ops.kernels.solve import ITERATIVE, Factor, factorize
 
 PASS = 1e-4
 """Relative residual of one pass of iterations: the contact iterations need no more from most of them."""
@@ -46,7 +45,7 @@ class TiedSolver:
     @property
     def direct(self) -> bool:
         """Whether a factor gives exact solutions."""
-        return self.factor.name in DIRECT
+        return self.factor.name not in ITERATIVE
 
     def once(self, b: FloatArray) -> FloatArray:
         """Solve exactly with a factor, to the relative residual ``PASS`` by iterations."""
@@ -113,8 +112,8 @@ def tied_solver(
     ----
     See ``factorize``.
     """
-    if method not in ("amg", "cg") or roots is None or points is None or (roots < 0).any():
-        return TiedSolver(A, factorize(A, method="auto" if method in ("amg", "cg") else method))
+    if method not in ITERATIVE or roots is None or points is None or (roots < 0).any():
+        return TiedSolver(A, factorize(A, method="auto" if method in ITERATIVE else method))
     d = points.shape[1]
     nodes, inverse = np.unique(roots // d, return_inverse=True)
     place = inverse * d + roots % d
