@@ -13,6 +13,9 @@ SMALL = 15_000
 EACH = 6_000
 """A factorisation is cheaper than iterations for more solutions than there are times this many unknowns."""
 
+SINGLE_FROM = 5_000
+"""Unknowns from which single precision saves time."""
+
 FEW_COLUMNS = 24
 """Solutions up to which a factorisation in single precision, each of them corrected, is the faster one."""
 
@@ -123,6 +126,6 @@ def choose(
         few = dim == 3 and iterative == "amg" and solutions * EACH < n
         direct = fits and not few
     if direct:
-        halved = n > SMALL and solutions <= FEW_COLUMNS and definite and is_installed("rslab")
+        halved = n > SINGLE_FROM and solutions <= FEW_COLUMNS and definite and is_installed("rslab")
         return Choice("single", need / 2, True) if halved else Choice("auto", need, True)
     return Choice(iterative, iterative_memory(entries), fits and (fast or n <= SUPERLU_LIMIT))

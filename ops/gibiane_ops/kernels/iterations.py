@@ -58,8 +58,8 @@ class Iteration:
         self._most = most
         self.iterations = 0
 
-    def __call__(self, b: FloatArray) -> FloatArray:
-        """Solve for one or several right-hand sides.
+    def __call__(self, b: FloatArray, tolerance: float | None = None) -> FloatArray:
+        """Solve for one or several right-hand sides, to another tolerance if one is given.
 
         Raises
         ------
@@ -72,16 +72,16 @@ class Iteration:
         found = np.empty(columns.shape)
         for start in range(0, columns.shape[1], COLUMNS):
             part = slice(start, start + COLUMNS)
-            found[:, part] = self._run(columns[:, part])
+            found[:, part] = self._run(columns[:, part], self._tolerance if tolerance is None else tolerance)
         return found.reshape(b.shape)
 
-    def _run(self, b: FloatArray) -> FloatArray:
+    def _run(self, b: FloatArray, tolerance: float) -> FloatArray:
         single = b.shape[1] == 1
         if single:
             b = b[:, 0]
         x = np.zeros(b.shape)
         r = b.copy()
-        wanted = self._tolerance * np.linalg.norm(b, axis=0)
+        wanted = tolerance * np.linalg.norm(b, axis=0)
         active = np.linalg.norm(r, axis=0) > wanted
         z = self._precondition(r)
         p = z.copy()
@@ -89,7 +89,7 @@ class Iteration:
         count = 0
         while active.any():
             if count == self._most:
-                left = float((np.linalg.norm(r, axis=0)[active] / wanted[active]).max()) * self._tolerance
+                left = float((np.linalg.norm(r, axis=0)[active] / wanted[active]).max()) * tolerance
                 raise ArithmeticError(f"{count} iterations leave a relative residual of {left:.1e}")
             q = self._A @ p
             curvature = (p * q).sum(axis=0)

@@ -17,7 +17,8 @@ def packages(monkeypatch):
 
 
 def test_small_systems_and_plane_systems_are_factorised(packages):
-    assert choose(14_000, 10**6, 3, 1, memory=8 * GB).method == "auto"
+    assert choose(4_000, 10**5, 3, 1, memory=8 * GB).method == "auto"
+    assert choose(14_000, 10**6, 3, 1, memory=8 * GB).method == "single"
     assert choose(300_000, 10**7, 2, 1, memory=8 * GB).method == "single"
     assert choose(300_000, 10**7, 2, 100, memory=8 * GB).method == "auto"
 
@@ -54,6 +55,7 @@ def test_superlu_takes_nothing_large(packages, dim, solutions):
     found = choose(31_000, 10**6, dim, solutions, memory=16 * GB)
     assert (found.method, found.reserve) == ("amg", False)
     assert choose(29_000, 10**6, dim, 1000, memory=16 * GB).method == "auto"
+    assert choose(10_000, 10**5, dim, 1, memory=16 * GB).method == "auto"
 
 
 def test_memory_of_this_machine_is_a_sane_number():

@@ -246,3 +246,13 @@ def test_nothing_to_solve():
     assert factorize(sp.csr_matrix((0, 0))).solve(np.zeros(0)).shape == (0,)
     assert factorize(chain(4)).solve(np.zeros((4, 0))).shape == (4, 0)
     np.testing.assert_array_equal(factorize(chain(4)).solve(np.zeros(4)), 0)
+
+
+@pytest.mark.parametrize("method", ["amg", "cg", "single", "auto"])
+def test_a_mechanism_that_the_load_leaves_alone_is_found(method):
+    # the loose part is not loaded: every residual looks right
+    A = sp.block_diag([laplacian3(9), chain(600, held=False)], format="csr")
+    b = np.r_[np.ones(729), np.zeros(600)]
+    with pytest.raises(SingularSystem) as caught:
+        factorize(A, method=method).solve(b)
+    np.testing.assert_array_equal(caught.value.unknowns, np.arange(729, 1329))
