@@ -174,7 +174,8 @@ class Factor:
                 self._note(str(error))
                 continue
             except FAILURES as error:
-                self._note(f"{self.name}: factorisation failed ({error})")
+                what = "factorisation failed" if self.name in DIRECT else "no solution"
+                self._note(f"{self.name}: {what} ({error})")
                 if self.name in DIRECT:
                     self._raise_if_singular(shifted=True)
                 continue
