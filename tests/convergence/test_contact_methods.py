@@ -45,6 +45,9 @@ def test_same_solution_as_newton(scene, mu, method):
     close_to(found, exact, share)
     assert found.report.worst < 1e-6
     assert found.history
+    assert len(found.changes) == len(found.history)
+    # the first iteration leaves the tied statuses, and a converged method has settled
+    assert found.changes[-1] == 0 or len(found.changes) == 1
     assert (found.report.n_open, found.report.n_slip) == (exact.report.n_open, exact.report.n_slip)
 
 

@@ -38,6 +38,7 @@ def fill_report(
             table.remove(index)
     history = Table()
     history.set("RESIDU", ListReel(state.history))
+    history.set("CHANGEMENTS", ListEnti(state.changes))
     for index, value in {
         "CONVERGE": converged,
         "METHODE": method.name,

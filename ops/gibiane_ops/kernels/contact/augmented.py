@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess, newton_steps
@@ -69,7 +70,7 @@ def solve_augmented_newton(
     law.need_no_adhesion("the augmented Lagrangian")
     check_stiffness(r)
     problem = Problem.of(interface, law, r, slip_origin)
-    history: list[float] = []
+    history = History()
     found = newton_steps(problem, first_guess(problem, start), tolerance, max_iter, history)[0]
     state = physical_state(interface, law, problem, found.w, found.r, found.status, history, slip_origin)
     return finished(interface, state, found.converged)
@@ -137,15 +138,16 @@ def solve_uzawa(
     if start is not None:
         problem = replace(problem, multiplier=now[1])
     exact = Problem.of(interface, law, 1.0, slip_origin)
-    history: list[float] = []
+    history = History()
     converged, reason = False, ""
     for _ in range(max_iter):
-        inner: list[float] = []
+        inner = History()
         # the inner residual adds to the error of the multipliers: keep it well below
         accuracy = min(1e-10, 0.01 * tolerance)
         found = penalty_steps(problem, now, accuracy, 60, inner)
         now = found.w, found.r
-        history.append(float(np.abs(found.r - problem.multiplier).max(initial=0)))
+        change = float(np.abs(found.r - problem.multiplier).max(initial=0))
+        history.add(change, exact.project(exact.augmented(*now))[1])
         problem = replace(problem, multiplier=found.r)
         converged = history[-1] <= tolerance and exact.merit(*now) <= 100 * tolerance
         if converged or not found.converged:

@@ -6,6 +6,7 @@ from itertools import islice
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess
@@ -74,7 +75,7 @@ def solve_bipotential(
     law.need_coulomb("the bipotential method")
     check_stiffness(rho)
     problem = Problem.of(interface, law, 1.0, slip_origin)
-    history: list[float] = []
+    history = History()
     converged = False
     w, r = first = first_guess(problem, start)
 
@@ -83,7 +84,7 @@ def solve_bipotential(
         return physical_state(interface, law, problem, w, r, status, history, slip_origin)
 
     for number, (w, r) in enumerate(islice(splitting_steps(problem, first, rho), max_iter)):
-        history.append(problem.merit(w, r))
+        history.add(problem.merit(w, r), problem.project(problem.augmented(w, r))[1])
         if history[-1] <= tolerance:
             converged = True
             break

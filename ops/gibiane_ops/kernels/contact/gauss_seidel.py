@@ -8,6 +8,7 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess
@@ -75,7 +76,7 @@ def solve_gauss_seidel(
     law.need_no_adhesion("projected Gauss-Seidel")
     problem = Problem.of(interface, law, 1.0, slip_origin)
     w = (np.zeros_like(problem.origin) if start is None else first_guess(problem, start)[0]).copy()
-    history: list[float] = []
+    history = History()
     converged = False
     sweep = _Sweep(problem)
     r = np.zeros_like(w)
@@ -90,9 +91,10 @@ def solve_gauss_seidel(
         if number % _CHECK == 0 or number == max_iter - 1:
             # the forces of equilibrium, so that the residual is that of the law alone
             balance = (problem.S @ w.ravel() - problem.f).reshape(w.shape)
-            residual = problem.merit(w, np.where(interface.active, balance, 0.0))
+            forces = np.where(interface.active, balance, 0.0)
+            residual, status = problem.merit(w, forces), problem.project(problem.augmented(w, forces))[1]
             sweep.restart(w)
-        history.append(residual)
+        history.add(residual, status)
         if residual <= tolerance:
             converged = True
             break

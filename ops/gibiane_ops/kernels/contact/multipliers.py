@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess
@@ -78,7 +79,7 @@ def solve_multipliers(
         check_stiffness(perturbation)
     problem = Problem.of(interface, law, perturbation or 1.0, slip_origin, penalty=perturbation is not None)
     w, r = sprung(problem, start) if problem.penalty else first_guess(problem, start)
-    history: list[float] = []
+    history = History()
     seen: list[IntArray] = []
     before = None
     best, converged = (w, r, problem.merit(w, r)), False
@@ -92,7 +93,7 @@ def solve_multipliers(
             w, r = _saddle(problem, w, r)
         except np.linalg.LinAlgError:
             break
-        history.append(problem.merit(w, r))
+        history.add(problem.merit(w, r), problem.project(problem.augmented(w, r))[1])
         polished = converged
         if history[-1] < best[2]:
             best = w, r, history[-1]

@@ -10,6 +10,7 @@ import numpy as np
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.balance import raise_if_runaway, raise_if_unbalanced
 from gibiane_ops.kernels.contact.drift import without_drift
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.outcome import physical_state
@@ -97,7 +98,7 @@ def solve_coulomb(
     open ones. Adhesion repeats the whole for each set of pairs that comes off.
     """
     law = Friction.of(interface.n_pairs, mu)
-    history: list[float] = []
+    history = History()
     bonded = bonded_at_start(interface, law)
     while True:
         problem = Problem.of(interface, law, gamma, slip_origin, bonded=bonded)
@@ -158,7 +159,7 @@ def newton_steps(
     first: tuple[FloatArray, FloatArray],
     tolerance: float,
     max_iter: int,
-    history: list[float],
+    history: History,
     *,
     damped: bool = False,
 ) -> tuple[Iterate, Iterate]:
@@ -171,7 +172,7 @@ def newton_steps(
         w and r in the units of the problem.
     tolerance : float
     max_iter : int
-    history : list of float
+    history : History
         Grows by one residual a step.
     damped : bool
         Shorten each step until the residual is below the worst of the last few.
@@ -201,7 +202,7 @@ def newton_steps(
         w, r = w + t * dw, r + t * dr
         recent = [*recent[-_MEMORY + 1 :], _energy(problem, w, r)]
         now = Iterate.of(problem, w, r, tolerance)
-        history.append(now.residual)
+        history.add(now.residual, now.status)
         best = best.better(now)
         stalled = 0 if best is now else stalled + 1
         if not damped and stalled >= _STALL:
@@ -223,7 +224,7 @@ def _solve(
     tolerance: float,
     max_iter: int,
     start: ContactState | None,
-    history: list[float],
+    history: History,
     slip_origin: FloatArray | None,
 ) -> ContactState:
     """Try full steps, then softer, damped and gradual ones."""
@@ -250,11 +251,12 @@ def _solve(
         best = best.better(_from_splitting(problem, first, tolerance, history))
     if not best.converged:
         raise_if_runaway(interface, state(last), state(best))
-        raise NotConverged(history, state(best))
+        wavering = int(np.count_nonzero(best.status != last.status))
+        raise NotConverged(history, state(best), f"{wavering} pairs change status back and forth" if wavering else "")
     return state(best)
 
 
-def _from_frictionless(interface: Interface, problem: Problem, tolerance: float, history: list[float]) -> Iterate:
+def _from_frictionless(interface: Interface, problem: Problem, tolerance: float, history: History) -> Iterate:
     """Start from contact without friction: near it when friction is weak and only settles where the body drifts to."""
     nothing = np.zeros(interface.n_pairs)
     smooth = replace(problem, law=replace(problem.law, mu=nothing, cohesion=nothing), gamma=min(problem.gamma, 0.01))
@@ -264,7 +266,7 @@ def _from_frictionless(interface: Interface, problem: Problem, tolerance: float,
 
 
 def robust_steps(
-    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: list[float]
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: History
 ) -> Iterate:
     """Run full steps, then if needed softer and damped ones, and give the best iterate met.
 
@@ -275,7 +277,7 @@ def robust_steps(
     tolerance : float
     max_iter : int
         Steps of each attempt.
-    history : list of float
+    history : History
         Grows by one residual a step.
 
     Returns
@@ -287,7 +289,7 @@ def robust_steps(
 
 
 def _other_paths(
-    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: list[float]
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: History
 ) -> Iterate:
     # the gamma of a penalty is its stiffness and stays
     soft = problem if problem.penalty else replace(problem, gamma=min(problem.gamma, SOFT_GAMMA))
@@ -299,7 +301,7 @@ def _other_paths(
 
 
 def _grow_friction(
-    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: list[float]
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: History
 ) -> Iterate:
     """Follow the solution from a small friction to the given one."""
     guess, law = first, problem.law
@@ -311,12 +313,12 @@ def _grow_friction(
 
 
 def _from_splitting(
-    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, history: list[float]
+    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, history: History
 ) -> Iterate:
     """Alternate equilibrium and cone, and try to finish with Newton's steps now and then."""
     best = Iterate.of(problem, *first, tolerance)
     for number, (w, r) in enumerate(islice(splitting_steps(problem, first, 1.0), _SPLITTINGS), 1):
-        history.append(problem.merit(w, r))
+        history.add(problem.merit(w, r), problem.project(problem.augmented(w, r))[1])
         if number % 200 == 0:
             best = best.better(newton_steps(problem, (w, r), tolerance, _FEW, history)[0])
             if best.converged:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import Iterate, first_guess, newton_steps
@@ -72,7 +73,7 @@ def solve_penalty(
     law.need_no_adhesion("the penalty method")
     check_stiffness(stiffness)
     problem = Problem.of(interface, law, stiffness, slip_origin, penalty=True)
-    history: list[float] = []
+    history = History()
     found = penalty_steps(problem, sprung(problem, start), tolerance, max_iter, history)
     state = physical_state(interface, law, problem, found.w, found.r, found.status, history, slip_origin)
     return finished(interface, state, found.converged)
@@ -83,7 +84,7 @@ def penalty_steps(
     first: tuple[FloatArray, FloatArray],
     tolerance: float,
     max_iter: int,
-    history: list[float],
+    history: History,
 ) -> Iterate:
     """Solve a penalised problem by full Newton steps, then by damped ones from the same start.
 
@@ -95,7 +96,7 @@ def penalty_steps(
     tolerance : float
     max_iter : int
         Steps of each attempt.
-    history : list of float
+    history : History
         Grows by one residual a step, those of both attempts.
 
     Returns

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess
 from gibiane_ops.kernels.contact.outcome import finished, physical_state
 from gibiane_ops.kernels.contact.problem import Problem
-from gibiane_ops.kernels.contact.report import ContactState
+from gibiane_ops.kernels.contact.report import OPEN, SLIP, ContactState
 from gibiane_ops.kernels.errors import UnsupportedLaw
 
 
@@ -73,12 +74,13 @@ def solve_projected_cg(
     fixed_step = 1 / float(np.linalg.eigvalsh(S)[-1])
     g = S @ w - f
     p = np.where(w < bound, g, 0.0)
-    history: list[float] = []
+    history = History()
     converged = False
     while len(history) < max_iter:
         free = w < bound
         phi, beta = np.where(free, g, 0.0), np.where(free, 0.0, np.maximum(g, 0.0))
-        history.append(float(np.abs(phi + beta).max(initial=0)))
+        closed = ~free.reshape(problem.origin.shape)[:, 0]
+        history.add(float(np.abs(phi + beta).max(initial=0)), np.where(closed, SLIP, OPEN))
         if history[-1] <= tolerance:
             converged = True
             break

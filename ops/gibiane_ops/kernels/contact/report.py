@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.cone import norms
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import BoolArray, Friction
 
@@ -74,6 +75,8 @@ class ContactState:
     history : list of float
         Residual after each step, relative.
     report : ContactReport
+    changes : list of int
+        Statuses that each step has changed; empty when they were not followed.
     """
 
     w: FloatArray
@@ -82,6 +85,7 @@ class ContactState:
     law: Friction
     history: list[float]
     report: ContactReport
+    changes: list[int] = field(default_factory=list)
 
     @property
     def iterations(self) -> int:
@@ -148,7 +152,8 @@ def check_state(
         n_stick=int((status == STICK).sum()),
         n_slip=int((status == SLIP).sum()),
     )
-    return ContactState(w, r, status, law, list(history), report)
+    changes = list(history.changes) if isinstance(history, History) else []
+    return ContactState(w, r, status, law, list(history), report, changes)
 
 
 def _reachable(law: Friction, normal: FloatArray, slip: FloatArray, bonded: BoolArray) -> FloatArray:

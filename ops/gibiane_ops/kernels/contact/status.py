@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.cone import norms
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state
@@ -91,7 +92,7 @@ def solve_statuses(
     G = _cut(tied, tied[:, 0], law, closed)
     stuck = closed & (norms(G) >= norms(tied[:, 1:])) & holding
     normal = _NormalContact(interface, closed, stuck)
-    history: list[float] = []
+    history = History()
     seen: list[IntArray] = []
     for _ in range(max_iter):
         w, r = normal.solve(G)
@@ -106,8 +107,8 @@ def solve_statuses(
             new_stuck = new_closed & ((stuck & ~slips) | sticks)
         largest = float(norms(new_G).max(initial=0))
         change = abs(largest - float(norms(G).max(initial=0)))
-        history.append(change / largest if largest else change)
         statuses = np.where(closed, np.where(stuck, STICK, SLIP), OPEN) if holding else _statuses(closed, tied, G)
+        history.add(change / largest if largest else change, statuses)
         state = check_state(interface, w, r, statuses, law, history, None)
         if not ((new_closed != closed) | (new_stuck != stuck)).any():
             if change <= tolerance * largest:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import first_guess, robust_steps
@@ -72,17 +73,17 @@ def solve_tresca_sequence(
     now = first_guess(problem, start)
     huge = 1e6  # a bound that no force of the interface reaches stands for infinity
     bound = np.minimum(problem.law.bound(now[1][:, 0]), huge)
-    history: list[float] = []
+    history = History()
     converged = False
     for _ in range(max_iter):
         frozen = replace(problem.law, mu=np.zeros_like(bound), cohesion=bound, when_open=True)
-        inner: list[float] = []
+        inner = History()
         found = robust_steps(replace(problem, law=frozen), now, 1e-10, 60, inner)
         now = found.w, found.r
         new = np.minimum(problem.law.bound(now[1][:, 0]), huge)
         scale = float(new.max(initial=0))
         change = float(np.abs(new - bound).max(initial=0))
-        history.append(change / scale if scale else change)
+        history.add(change / scale if scale else change, problem.project(problem.augmented(*now))[1])
         bound = new
         if history[-1] <= tolerance or not found.converged:
             converged = found.converged
