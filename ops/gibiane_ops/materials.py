@@ -60,7 +60,8 @@ MATE = operator(
     "(tension that surfaces in contact withstand before they come off for good; under a tension t the bound of "
     "friction is COHE - MU t), JEU (initial gap, instead of "
     "the one of the geometry: 0. for curved surfaces in touch whose facets cross): numbers, or CHPOINT on the "
-    "slave surface. A value is a number, or a CHPOINT or MCHAML, of which each element takes its mean.",
+    "slave surface. Heat: K (conductivity), RHO and C (capacity); surfaces in a fluid: H (exchange). A value is "
+    "a number, or a CHPOINT or MCHAML, of which each element takes its mean.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 1 (0 0) (1 0)) TRAN 1 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ; LIST 'RESU' MA ;",
     see=["MODELISER", "RIGIDITE", "EPTH", "CARACTERISTIQUE"],
@@ -76,10 +77,12 @@ CARA = operator(
 )
 
 VALUE = Arg("x", (FLOTTANT, CHPOINT, MCHAML))
+HEAT = {"K": "conductivity", "RHO": "mass density", "C": "heat capacity of a unit of mass"}
+EXCHANGE = {"H": "exchange coefficient"}
 
 
 @MATE.stream(
-    *(Key(name, doc, VALUE) for name, doc in (ISOTROPIC | ORTHOTROPIC | SECTION | CONTACT).items()),
+    *(Key(name, doc, VALUE) for name, doc in (ISOTROPIC | ORTHOTROPIC | SECTION | CONTACT | HEAT | EXCHANGE).items()),
     Key("DIRECTION", "first axis, or plane of the first two", Arg("v", POINT)),
     Key("RADIAL", "centre or axis that the first direction leaves", Arg("p", POINT)),
     Key("INCLINE", "angle from there to the first axis", Arg("a", FLOTTANT)),
@@ -90,6 +93,10 @@ def _mate(ctx: Context, q: Operands) -> MChaml:
     model, given, axes = _read(ctx, q)
     if model.contacts:
         return _contact_material(ctx, model, given)
+    if model.heated:
+        if model.zones:
+            ctx.fail(21, "the model mixes solids and heat: make their materials one by one, and join them by ET")
+        return _thermal_material(ctx, model, given)
     zones = []
     for zone in model.zones:
         needed = _needed(zone)
@@ -132,6 +139,8 @@ def _allowed(model: Modele) -> list[str]:
     """Return the names of properties that a model knows."""
     if model.contacts:
         return list(dict.fromkeys(name for zone in model.contacts for name in (*NEEDS[zone.law], *MAY_HAVE[zone.law])))
+    if model.heated and not model.zones:
+        return [name for zone in model.heated for name in (EXCHANGE if "CONVECTION" in zone.law else HEAT)]
     names: dict[str, str] = {}
     for zone in model.zones:
         names |= (ORTHOTROPIC if zone.orthotropic else ISOTROPIC) | (SECTION if zone.bars else {})
@@ -280,6 +289,24 @@ def _checked(ctx: Context, zone: ChamZone) -> ChamZone:
     if isinstance(zone.zone, ModelZone) and zone.zone.orthotropic:
         elastic_law(ctx, MChaml([zone], MATERIAL, "GRAVITE"), zone.zone)
     return zone
+
+
+def _thermal_material(ctx: Context, model: Modele, given: dict[str, Any]) -> MChaml:
+    """Return K, C and RHO of solids, H of surfaces in a fluid."""
+    zones = []
+    for zone in model.heated:
+        known = EXCHANGE if "CONVECTION" in zone.law else HEAT
+        own = {name: value for name, value in given.items() if name in known}
+        first = next(iter(known))
+        if first not in own:
+            ctx.fail(46, "the property {name} is missing", name=first, meaning=known[first], hint="{name}: {meaning}")
+        found = ChamZone(zone, list(own), _values(ctx, zone, own))
+        for name in own:
+            if not (found.component(name) > 0).all():
+                value = float(found.component(name).min())
+                ctx.fail(41, "{name} = {value}: it is positive", at=name, name=name, value=value)
+        zones.append(found)
+    return MChaml(zones, MATERIAL, "GRAVITE")
 
 
 def _contact_material(ctx: Context, model: Modele, given: dict[str, Any]) -> MChaml:

@@ -16,18 +16,11 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, cells_in_turn
+from gibiane_ops.values.modele import dual_of
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import ConditionPart, MatrixPart, Rigidite
 
-DUALS = {"UX": "FX", "UY": "FY", "UZ": "FZ", "UR": "FR", "UT": "FT", "RX": "MX", "RY": "MY", "RZ": "MZ", "RT": "MT"} | {
-    "T": "Q", "LX": "FLX", "P": "FP", "PI": "FPI", "ALFA": "FALF", "BETA": "FBET"
-}  # fmt: skip
 MANU, EXTR, CHAN = extend("MANUEL"), extend("EXTRAIRE"), extend("CHANGER")
-
-
-def dual_of(name: str) -> str:
-    """Return the name of the force that goes with an unknown; F and its first letters where none is settled."""
-    return DUALS.get(name, f"F{name}"[:4])
 
 
 @dataclass

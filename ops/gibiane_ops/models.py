@@ -21,6 +21,9 @@ FORMULATIONS = (
     "FROTTANT",
     "CHARGEMENT",
     "PRESSION",
+    "THERMIQUE",
+    "CONDUCTION",
+    "CONVECTION",
 )
 LAWS = ("COULOMB", "TRESCA", "REGULARISE", "NORTON")
 KINEMATICS = ("MESC", "SYME", "FAIB", "MORT", "NOEU", "RIGIDE")
@@ -29,7 +32,6 @@ ELEMENTS = ("BARR", *SHAPES)
 
 # Words that MODE of Cast3M takes and this one does not: formulations, behaviours, finite elements.
 ELSEWHERE = [
-    "THERMIQUE",
     "THERMOHYDRIQUE",
     "POREUX",
     "DARCY",
@@ -42,9 +44,7 @@ ELSEWHERE = [
     "METALLURGIE",
     "ELECTROSTATIQUE",
     "MAGNETODYNAMIQUE",
-    "CONVECTION",
     "RAYONNEMENT",
-    "CONDUCTION",
     "ADVECTION",
     "PLASTIQUE",
     "PARFAIT",
@@ -104,7 +104,8 @@ MODE = operator(
     "lets COFR tell their forces apart. Laws after 'FROTTANT': 'COULOMB' (MU, COHE), 'TRESCA' (SEUI), "
     "'REGULARISE' (MU, KT: elastic slip), 'NORTON' (MU, EXPO, VREF). 'RIGIDE': G1 is an obstacle that belongs "
     "to no solid; its nodes have no unknowns, and the nodes of G2 need not coincide with them. "
-    "`MODE G 'CHARGEMENT' 'PRESSION'` makes a surface under pressure: see PRES.",
+    "`MODE G 'CHARGEMENT' 'PRESSION'` makes a surface under pressure: see PRES. `MODE G 'THERMIQUE' "
+    "('CONDUCTION')` makes a solid that conducts heat, 'THERMIQUE' 'CONVECTION' a surface in a fluid: see COND.",
     example="OPTI DIME 3 ELEM CUB8 ; B = (DROI 1 (0 0 0) (1 0 0)) TRAN 1 (0 1 0) ;\n"
     "V = B VOLU 1 'TRAN' (0 0 1) ; MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ; LIST 'RESU' MO ;",
     see=["MATERIAU", "RIGIDITE"],
@@ -119,7 +120,7 @@ MODE = operator(
     Key("CONS", "name of the part", Arg("part", MOT)),
     syntax="g:MAILLAGE (g2:MAILLAGE) 'MECANIQUE' ('ELASTIQUE' ('ISOTROPE'|'ORTHOTROPE')) ('BARR') | 'CONTACT' "
     "('UNILATERAL'|'FROTTANT' 'COULOMB'|'TRESCA'|'REGULARISE'|'NORTON') ('MESC'|'MORT'|'NOEU'|'SYME'|'FAIB') "
-    "('RIGIDE') | 'CHARGEMENT' 'PRESSION'",
+    "('RIGIDE') | 'CHARGEMENT' 'PRESSION' | 'THERMIQUE' ('CONDUCTION'|'CONVECTION')",
     gives=[MMODEL],
 )
 def _mode(ctx: Context, q: Operands) -> Modele:
@@ -149,7 +150,7 @@ def _mode(ctx: Context, q: Operands) -> Modele:
             "models with {word} are not available yet",
             at="word",
             word=missing,
-            hint="there are elastic solids, bars, and contact with or without friction",
+            hint="there are elastic solids, bars, heat conduction, and contact with or without friction",
         )
     if "CONTACT" in words:
         return _contact_model(ctx, q, meshes, words)
@@ -157,6 +158,10 @@ def _mode(ctx: Context, q: Operands) -> Modele:
         if len(meshes) != 1:
             raise q.missing(MAILLAGE, "the surface under pressure")
         return _pressure_model(ctx, meshes[0])
+    if "THERMIQUE" in words:
+        if len(meshes) != 1:
+            raise q.missing(MAILLAGE, "the elements")
+        return _thermal_model(ctx, meshes[0], "CONVECTION" in words)
     if "MECANIQUE" not in words:
         ctx.fail(7, "the formulation is missing", hint="MODE G 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE'")
     if len(meshes) != 1:
@@ -184,6 +189,27 @@ def _solid_model(ctx: Context, mesh: Maillage, words: list[str]) -> Modele:
     law = ("ELASTIQUE", "ORTHOTROPE" if "ORTHOTROPE" in words else "ISOTROPE")
     blocks = [block for block in mesh.blocks if not wanted or block.shape in wanted]
     return Modele([_solid_zone(ctx, mesh, block, law, mode, "BARR" in words) for block in blocks])
+
+
+def _thermal_model(ctx: Context, mesh: Maillage, convection: bool) -> Modele:
+    """Return the model of a solid that conducts heat, or of a surface in a fluid."""
+    dim = int(ctx.option("DIME"))
+    if dim not in (2, 3):
+        ctx.fail(14, "the dimension of space is not set", hint="OPTI DIME 3 ;")
+    mode = ctx.option("MODE") or ("TRID" if dim == 3 else "PLAN DEFO")
+    wanted = dim - 1 if convection else dim
+    wrong = [name for name in mesh.shapes if SHAPES[name].dim != wanted]
+    if wrong or not mesh.shapes:
+        ctx.fail(
+            16,
+            "a fluid touches facets, not {shapes}" if convection else "{shapes} elements do not fill the space",
+            at="mesh 1",
+            shapes=" ".join(wrong) or "nothing",
+            hint="a solid that conducts fills the space; 'CONVECTION' acts on its facets",
+        )
+    law = ("CONVECTION",) if convection else ("CONDUCTION",)
+    blocks = mesh.blocks if dim == 3 or convection else [_counterclockwise(mesh, block) for block in mesh.blocks]
+    return Modele([], [], [], [ModelZone(Maillage(mesh.store, [b]), "THERMIQUE", law, mode) for b in blocks])
 
 
 def _pressure_model(ctx: Context, mesh: Maillage) -> Modele:

@@ -15,7 +15,7 @@ from gibiane_ops.values.conditions import family
 from gibiane_ops.values.contact_solution import Wishes, solve_contact
 from gibiane_ops.values.linear import solve_linear
 from gibiane_ops.values.methods import PLAIN, STATUSES, WITH_R, Method
-from gibiane_ops.values.modele import FORCES
+from gibiane_ops.values.modele import FORCES, dual_of
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.suites import ListChpo
@@ -212,7 +212,7 @@ def _reac(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
         nodes = store.canonical(part.node)
         for name in np.unique(part.name):
             chosen = part.name == name
-            terms.setdefault("F" + str(name)[1:], []).append((nodes[chosen], force[chosen]))
+            terms.setdefault(dual_of(str(name)), []).append((nodes[chosen], force[chosen]))
     for contact in k.contacts:
         nodes = np.arange(store.count)
         names = FORCES[family(ctx)]

@@ -137,5 +137,5 @@ def _et(ctx: Context, a: Rigidite, b: Rigidite, more: list[Rigidite]) -> Rigidit
 )
 def _et_models(ctx: Context, a: Modele, b: Modele, more: list[Modele]) -> Modele:
     every = (a, b, *more)
-    loads = [zone for m in every for zone in m.loads]
-    return Modele([z for m in every for z in m.zones], [c for m in every for c in m.contacts], loads)
+    zones, contacts = [z for m in every for z in m.zones], [c for m in every for c in m.contacts]
+    return Modele(zones, contacts, [z for m in every for z in m.loads], [z for m in every for z in m.heated])

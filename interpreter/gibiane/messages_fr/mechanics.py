@@ -211,7 +211,6 @@ MECHANICS = {
     "{what} = {value} is out of bounds: {limit}": "{what} = {value} est hors bornes : {limit}",
     "{count} {shape} with a negative or zero Jacobian: elements {numbers}; element {number}, Jacobian {value}, corners {where}": "{count} {shape} de jacobien négatif ou nul : éléments {numbers} ; élément {number}, jacobien {value}, sommets {where}",
     "models with {word} are not available yet": "les modèles avec {word} ne sont pas encore disponibles",
-    "there are elastic solids, bars, and contact with or without friction": "il y a des solides élastiques, des barres, et du contact avec ou sans frottement",
     "its sides cross, or its corners are aligned": "ses côtés se croisent, ou ses coins sont alignés",
     "its nodes turn the wrong way: ORIE turns elements round, INVE lines": "ses noeuds tournent à l'envers : ORIE retourne les éléments, INVE les lignes",
     "{count} nodes lie on the axis, the first at ({where}): they have no radial direction": "{count} noeuds sont sur l'axe, le premier en ({where}) : ils n'ont pas de direction radiale",

@@ -251,7 +251,7 @@ _TABLES = {"CONTRAINTES": STRESSES, "DEFORMATIONS": STRAINS, "DEPLACEMENTS": DIS
 
 @EXTR.form(Arg("model", MMODEL, "model"), Key("MAIL", "its mesh", required=True), gives=[MAILLAGE])
 def _mesh_of_model(ctx: Context, model: Modele, mail: bool) -> Maillage:
-    meshes = [z.mesh for z in (*model.zones, *model.loads)]
+    meshes = [z.mesh for z in (*model.zones, *model.heated, *model.loads)]
     return _together(meshes or [m for c in model.contacts for m in (c.master, c.slave)], ctx)
 
 
@@ -262,7 +262,7 @@ def _mesh_of_model(ctx: Context, model: Modele, mail: bool) -> Maillage:
 )
 def _names_of_model(ctx: Context, model: Modele, what: str) -> ListMots:
     if not model.zones:
-        ctx.fail(21, "the model has no solid", at="model", hint="contact and pressure are no solids")
+        ctx.fail(21, "the model has no solid", at="model", hint="contact, pressure and heat are no elastic solids")
     return ListMots(_TABLES[what][model.zones[0].family])
 
 
@@ -271,6 +271,7 @@ def _zones_of_model(ctx: Context, model: Modele, zone: bool) -> Table:
     table = Table()
     every = [Modele([each]) for each in model.zones] + [Modele([], [each]) for each in model.contacts]
     every += [Modele([], [], [each]) for each in model.loads]
+    every += [Modele([], [], [], [each]) for each in model.heated]
     for number, each in enumerate(every, 1):
         table.set(number, each)
     return table

@@ -14,7 +14,7 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import support_points
 from gibiane_ops.values.algebra import SCAL, SCALAIRE
 from gibiane_ops.values.champs import ChamZone, MChaml
-from gibiane_ops.values.material import solid_zones
+from gibiane_ops.values.material import field_zones
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import node_store
 
@@ -24,7 +24,7 @@ WHICH = Arg("n", ENTIER, "which one", optional=True)
 
 @COOR.form(Arg("model", MMODEL, "model: at the nodes of its elements"), WHICH, gives=["MCHAML..."])
 def _of_model(ctx: Context, model: Modele, n: int | None) -> Any:
-    return _places(ctx, solid_zones(ctx, model), "NOEUD", n)
+    return _places(ctx, field_zones(ctx, model), "NOEUD", n)
 
 
 @COOR.form(Arg("field", MCHAML, "element field: at its points"), WHICH, gives=["MCHAML..."])

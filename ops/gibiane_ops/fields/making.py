@@ -201,7 +201,7 @@ def _manu_chml(ctx: Context, q: Operands) -> Any:
     if given.where is None:
         raise q.missing(MMODEL, "the elements of the field")
     on_mesh = isinstance(given.where, Maillage)
-    zones = mesh_zones(ctx, given.where) if on_mesh else [*given.where.zones, *given.where.loads]
+    zones = mesh_zones(ctx, given.where) if on_mesh else [*given.where.zones, *given.where.heated, *given.where.loads]
     if not zones:
         ctx.fail(21, "there is no element to carry the field", at="where")
     support = given.words.get("support") or ("NOEUD" if on_mesh else "STRESSES")

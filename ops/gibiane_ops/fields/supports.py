@@ -18,7 +18,7 @@ from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, chosen
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
-from gibiane_ops.values.material import field_zones, on_zone, solid_zones
+from gibiane_ops.values.material import field_zones, on_zone
 from gibiane_ops.values.mechanics import checked_corners
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, NodeStore, node_store
@@ -37,7 +37,7 @@ TYPE = Arg("subtype", MOT, "sub-type of the result", optional=True)
 )
 def _to_nodes(ctx: Context, chpo: bool, model: Modele, field: MChaml, how: str | None) -> ChPoint:
     store = node_store(ctx)
-    zones = [(z, on_zone(ctx, field, z, "field")) for z in solid_zones(ctx, model)]
+    zones = [(z, on_zone(ctx, field, z, "field")) for z in field_zones(ctx, model)]
     if how == "SUPP":
         return _at_points(field, zones, store)
     parts = {}
@@ -84,7 +84,7 @@ def _at_nodes(zone: ModelZone, values: FloatArray, field: MChaml) -> FloatArray:
 )
 def _to_support(ctx: Context, support: str, model: Modele, field: MChaml, subtype: str | None) -> MChaml:
     zones = []
-    for zone in solid_zones(ctx, model):
+    for zone in field_zones(ctx, model):
         values = on_zone(ctx, field, zone, "field")
         zones.append(ChamZone(zone, values.names, moved(shape(zone.shape), values.values, field.support, support)))
     return MChaml(zones, subtype.strip() if subtype else field.subtype, support, field.title)
@@ -269,7 +269,7 @@ def _intg(ctx: Context, model: Modele, field: MChaml, elem: bool, name: str | No
         name = field.names[0]
     name = name.strip()
     zones = []
-    for zone in solid_zones(ctx, model):
+    for zone in field_zones(ctx, model):
         values = on_zone(ctx, field, zone, "field")
         if name not in values.names:
             ctx.fail(
@@ -310,7 +310,7 @@ GRAD = operator(
 )
 def _grad(ctx: Context, model: Modele, field: ChPoint, cara: MChaml | None) -> MChaml:
     zones = []
-    for zone in solid_zones(ctx, model):
+    for zone in field_zones(ctx, model):
         of = shape(zone.shape)
         axes = ("R", "Z") if zone.mode == "AXIS" else ("X", "Y", "Z")[: zone.dim]
         names = [n for n in field.names if len(np.intersect1d(field.parts[n][0], zone.cells))]

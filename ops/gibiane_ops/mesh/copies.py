@@ -94,6 +94,7 @@ class Copier:
                 [self._solid(zone) for zone in x.zones],
                 [self._pair(z) for z in x.contacts],
                 [self._solid(z) for z in x.loads],
+                [self._solid(z) for z in x.heated],
             )
         zones = [ChamZone(self._zone(z.zone), z.names, z.values) for z in x.zones]
         return MChaml(zones, x.subtype, x.support, x.title)

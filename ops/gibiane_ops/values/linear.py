@@ -81,9 +81,11 @@ def singular(ctx: Context, system: System, failure: k_errors.SingularSystem, num
     if numbers is None or not len(failure.unknowns):
         ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
     unknowns = numbers[failure.unknowns]
+    space = max(int(ctx.option("DIME")), 2)
+    points = system.store.coords[system.nodes[unknowns[:3] // system.dim]][:, :space]
     named = [
-        f"{system.names[i % system.dim]} at ({' '.join(f'{x:g}' for x in system.points[i // system.dim])})"
-        for i in unknowns[:3].tolist()
+        f"{system.names[i % system.dim]} at ({' '.join(f'{x:g}' for x in point)})"
+        for i, point in zip(unknowns[:3].tolist(), points, strict=True)
     ]
     ctx.fail(
         49,

@@ -49,13 +49,13 @@ def told_apart(ctx: Context, fields: Sequence[tuple[str, MChaml | None]], *subty
 def solid_zones(ctx: Context, model: Modele, at: str = "model") -> list[ModelZone]:
     """Return the solid zones of a model, or fail when it has none."""
     if not model.zones:
-        ctx.fail(21, "the model has no solid", at=at, hint="contact and pressure are no solids")
+        ctx.fail(21, "the model has no solid", at=at, hint="contact, pressure and heat are no elastic solids")
     return model.zones
 
 
 def field_zones(ctx: Context, model: Modele, at: str = "model") -> list[ModelZone]:
-    """Return the zones of a model that carry element fields: solids, and surfaces under pressure."""
-    return [*model.zones, *model.loads] or solid_zones(ctx, model, at)
+    """Return the zones of a model that carry element fields: solids, zones of heat, surfaces under pressure."""
+    return [*model.zones, *model.heated, *model.loads] or solid_zones(ctx, model, at)
 
 
 def on_zone(ctx: Context, field: MChaml, zone: ModelZone, at: str | None = None) -> ChamZone:

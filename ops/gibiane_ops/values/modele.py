@@ -25,6 +25,16 @@ STRESSES = {
 }
 
 
+DUALS = {"UX": "FX", "UY": "FY", "UZ": "FZ", "UR": "FR", "UT": "FT", "RX": "MX", "RY": "MY", "RZ": "MZ", "RT": "MT"} | {
+    "T": "Q", "LX": "FLX", "P": "FP", "PI": "FPI", "ALFA": "FALF", "BETA": "FBET"
+}  # fmt: skip
+
+
+def dual_of(name: str) -> str:
+    """Return the name of the force that goes with an unknown; F and its first letters where none is settled."""
+    return DUALS.get(name, f"F{name}"[:4])
+
+
 class ModelZone:
     """Elements of one type with one formulation and law, in one calculation mode.
 
@@ -116,7 +126,7 @@ class ContactZone:
 
 
 class Modele(Value):
-    """A model: zones of solids, contact zones, and surfaces under pressure (`loads`)."""
+    """A model: zones of solids, contact zones, surfaces under pressure (`loads`), zones of heat (`heated`)."""
 
     type_name = MMODEL
 
@@ -125,10 +135,12 @@ class Modele(Value):
         zones: Sequence[ModelZone],
         contacts: Sequence[ContactZone] = (),
         loads: Sequence[ModelZone] = (),
+        heated: Sequence[ModelZone] = (),
     ) -> None:
         self.zones = list(zones)
         self.contacts = list(contacts)
         self.loads = list(loads)
+        self.heated = list(heated)
 
     def listing(self, session: Any, brief: bool = False, width: int | None = None) -> Iterator[str]:
         """Yield the lines that LIST prints."""
@@ -137,6 +149,11 @@ class Modele(Value):
             yield (
                 f" zone {number} : {zone.mesh.n_cells} element(s) {zone.shape}, {zone.formulation} "
                 f"{' '.join(zone.law)}, mode {zone.mode}"
+            )
+        for number, zone in enumerate(self.heated, 1):
+            yield (
+                f" thermique {number} : {zone.mesh.n_cells} element(s) {zone.shape}, {' '.join(zone.law)}, "
+                f"mode {zone.mode}"
             )
         for number, zone in enumerate(self.loads, 1):
             yield f" chargement {number} : {zone.mesh.n_cells} element(s) {zone.shape}, PRESSION, mode {zone.mode}"
