@@ -35,6 +35,9 @@ from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.smoothed import METHODS, Solid, smoothed
 
 ERRE = extend("ERREUR")
+MIXTURE = 2.0
+"""Ratio of stiffnesses in one solid above which a note tells that smoothing mixes them."""
+
 HOW = Key(METHODS, "smoothing of the stresses (as LISSER)", name="method")
 
 
@@ -52,10 +55,26 @@ def _solid_part(
     for solid in solids:
         for zone, block in zip(solid.zones, solid.blocks, strict=True):
             compliance = elastic_compliance(ctx, material, zone, "mat")
+            _tell_mixture(ctx, compliance)
             with worded(ctx, at="model"):
                 errors.append(solid_error(solid.points, block, solid.nodal, compliance, axisymmetric=zone.axisymmetric))
             zones.append(zone)
     return Parts(zones, errors)
+
+
+def _tell_mixture(ctx: Context, compliance: FloatArray) -> None:
+    """Say that the elements of one solid differ much: a smoothed stress runs across their jumps."""
+    if compliance.ndim < 3:
+        return
+    size = np.trace(compliance, axis1=1, axis2=2)
+    if size.max() > MIXTURE * size.min():
+        ctx.warn(
+            "G411",
+            "one solid holds materials {ratio} times stiffer than others: its smoothed stress runs across their jumps",
+            level=0,
+            ratio=f"{size.max() / size.min():.3g}",
+            hint="MODE for each material and their union by ET: solids are smoothed apart",
+        )
 
 
 @ERRE.form(
