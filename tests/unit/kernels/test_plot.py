@@ -259,6 +259,17 @@ def test_a_plane_mesh_is_centred_and_has_its_proportions(tmp_path):
     assert (np.ptp(columns) + 1) / (np.ptp(rows) + 1) == pytest.approx(2.0, rel=0.02)
 
 
+def test_a_flat_mesh_seen_from_above_is_drawn_as_in_the_plane(tmp_path):
+    cells = [np.array([[0, 1, 2, 3]])]
+    raised = np.column_stack([SQUARE, np.full(len(SQUARE), 7.0)])
+    draw_scene(tmp_path / "plane.png", [Surface(SQUARE, cells, color=RED)], size=SMALL)
+    draw_scene(tmp_path / "above.png", [Surface(raised, cells, color=RED)], view=(1.0, -2.0, 1e6), size=SMALL)
+    draw_scene(tmp_path / "aside.png", [Surface(raised, cells, color=RED)], view=(1.0, -2.0, 3.0), size=SMALL)
+    plane, above, aside = (picture(tmp_path / f"{name}.png") for name in ("plane", "above", "aside"))
+    np.testing.assert_array_equal(above, plane)
+    assert (aside != plane).any()
+
+
 def test_what_lies_behind_is_hidden(tmp_path):
     # the blue square is wholly behind the cube, drawn last
     behind = np.array([[0.3, 3.0, 0.1], [0.7, 3.0, 0.1], [0.7, 3.0, 0.4], [0.3, 3.0, 0.4]])
