@@ -71,4 +71,11 @@ GEOMETRY: dict[str, str] = {
     "a fluid touches facets, not {shapes}": "un fluide touche des facettes, pas {shapes}",
     "{shapes} elements do not fill the space": "des éléments {shapes} ne remplissent pas l'espace",
     "a solid that conducts fills the space; 'CONVECTION' acts on its facets": "un solide qui conduit remplit l'espace ; 'CONVECTION' agit sur ses facettes",
+    'times are at least two, and increase': 'il faut au moins deux instants, croissants',
+    'one curve of numbers is wanted': 'il faut une courbe de nombres',
+    '{times} times and {fields} fields': '{times} instants et {fields} champs',
+    'fields of one kind are wanted: CHPOINT, or MCHAML': "il faut des champs d'un même type : CHPOINT, ou MCHAML",
+    'there are several loads ({names}): name one': 'il y a plusieurs chargements ({names}) : en nommer un',
+    'the time {t} is not between {first} and {last}': "l'instant {t} n'est pas entre {first} et {last}",
+    'there is no load {name}; there are {names}': "il n'y a pas de chargement {name} ; il y a {names}",
 }
