@@ -40,7 +40,7 @@ CHAR = operator(
     topic="loads",
     summary="a field that varies with time",
     notice="`C = CHAR 'NAME' FIELD EVOL`: a CHPOINT or MCHAML times a curve of time; `CHAR 'NAME' LREEL T`: fields at "
-    "the times of the list, linear in between, from a LISTCHPO, a LISTOBJE or a table of indices 0, 1, ... or 1, 2, ... "
+    "the times of the list, linear in between, from a LISTCHPO, a LISTOBJE or a table of indices 0, 1, ... "
     "ET joins loads; names (MECA DIMP T Q ...) are yours. TIRE gives the field at a time; `EXTR C 'COMP'` the names, "
     "`EXTR C 'NAME'` the loads of a name.",
     example=_EXAMPLE + "LIST C ;",
