@@ -133,6 +133,8 @@ MECHANICS = {
     "'{word}' goes with coincident nodes only: between different meshes its conditions outnumber the motions of the surfaces, which lock": "'{word}' demande des noeuds coïncidents : entre des maillages différents ses conditions sont plus nombreuses que les mouvements des surfaces, qui se bloquent",
     "'MORT' holds the mean gap about each node, and is exact for a uniform pressure": "'MORT' tient le jeu moyen autour de chaque noeud, et est exact pour une pression uniforme",
     "nodes of the slave surface are held, and the master is too coarse to follow them all: {count} would be left without contact, the first at ({where})": "des noeuds de la surface esclave sont tenus, et le maître est trop grossier pour tous les suivre : {count} resteraient sans contact, le premier en ({where})",
+    "the conditions hold a relative displacement of contact nodes along a line that is no axis": "les conditions tiennent un déplacement relatif de noeuds de contact le long d'une droite qui n'est pas un axe",
+    "a plane of symmetry that crosses a contact surface goes along axes: turn the model": "un plan de symétrie qui traverse une surface de contact suit les axes : tourner le modèle",
     "take the held surface as the master": "prendre la surface tenue pour maître",
     "{count} contact nodes slip by more than half a facet, most by {slip} at ({where})": "{count} noeuds de contact glissent de plus d'une demi-facette, au plus de {slip} en ({where})",
     "nodes keep the facets that they face at the start: the result holds for small slips": "les noeuds gardent les facettes qui leur font face au départ : le résultat vaut pour de petits glissements",

@@ -111,7 +111,12 @@ def solve_contact(
             ctx.fail(49, "the system is singular: {reason}", at="k", reason=str(failure))
         except k_errors.ContradictoryConditions:
             if not len(system.stop_signs):
-                raise
+                ctx.fail(
+                    "G407",
+                    "the conditions hold a relative displacement of contact nodes along a line that is no axis",
+                    at="k",
+                    hint="a plane of symmetry that crosses a contact surface goes along axes: turn the model",
+                )
             ctx.fail(
                 "G407",
                 "a condition with MINI or MAXI acts on what another condition already holds",

@@ -13,6 +13,10 @@ ALIGNED = 1e-6
 """A normal whose free part is shorter than this is a normal that the supports hold."""
 
 
+OFF = 0.75
+"""An axis is well off the normal when its component is below this one."""
+
+
 def local_frames(normals: FloatArray, free: BoolArray) -> tuple[FloatArray, BoolArray, FloatArray]:
     """Build one orthonormal frame per pair, aligned with the components that supports block.
 
@@ -57,11 +61,11 @@ def local_frames(normals: FloatArray, free: BoolArray) -> tuple[FloatArray, Bool
 
 def _tangents(n: FloatArray, free: BoolArray, holds: BoolArray) -> tuple[FloatArray, FloatArray]:
     """Choose t1 and t2 so that every blocked direction other than the normal is an axis of the frame."""
-    # t1 and t2 are normal to a reference axis and to n: the least aligned with n, or first an axis that must be kept,
-    # blocked where the normal is free, free where the normal is blocked
+    # t1 and t2 are normal to a reference axis and to n. First an axis that must be kept, blocked where the normal is
+    # free, free where the normal is blocked; then y, z, x, whichever is well off n: neighbours on a surface that turns
+    # little take the same, so that their tangential components can be compared, and t1 is x when n is z
     kept = np.where(holds[:, None], ~free, free)
-    score = np.abs(n) - np.where(kept, 2.0, 0.0)
-    score[:, 0] += 1e-9  # between x and y take y, so that t1 is x when n is z
+    score = np.where(np.abs(n) <= OFF, 0.0, np.abs(n)) - np.where(kept, 2.0, 0.0) + [2e-9, 0.0, 1e-9]
     axis = np.eye(3)[score.argmin(axis=1)]
     t1 = np.cross(axis, n)
     t1 /= np.sqrt(np.einsum("ni,ni->n", t1, t1))[:, None]
