@@ -118,8 +118,10 @@ def choose(
     iterative = ("amg" if elastic else "cg") if definite else "minres"
     if wish == "ITER":
         direct = False
-    elif wish == "DIRE" or n <= SMALL:
+    elif wish == "DIRE":
         direct = True
+    elif n <= SMALL:
+        direct = fits
     elif not fast and n > SUPERLU_LIMIT and iterative == "amg":
         direct = False
     else:

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from gibiane_ops.kernels import iterations, packages
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.errors import BadValue, MissingPackage, SingularSystem, TooLarge
+from gibiane_ops.kernels.errors import BadValue, MissingPackage, SingularSystem
 from gibiane_ops.kernels.iterations import Iteration
 from gibiane_ops.kernels.packages import DIRECT, MODULES, Solve, is_installed
 
@@ -168,11 +168,6 @@ class Factor:
             try:
                 self._solve = self._factorize(self._A)
                 self._probe()
-            except TooLarge as error:
-                if not self._packages:
-                    raise
-                self._note(str(error))
-                continue
             except FAILURES as error:
                 what = "factorisation failed" if self.name in DIRECT else "no solution"
                 self._note(f"{self.name}: {what} ({error})")
@@ -282,7 +277,7 @@ def factorize(
     SingularSystem
         When a null vector is found or no package can factorise the matrix.
     TooLarge
-        When no package has memory enough.
+        When the analysis of the pattern shows that a factorisation does not fit into the memory there is.
     MissingPackage
         When ``method`` names a package that is not installed.
     BadValue

@@ -239,6 +239,8 @@ def _solution(ctx: Context, system: System, reduction: Reduction, solver: _Solve
         padded = np.zeros((reduction.n, load.shape[1]))
         padded[reduction.free] = load
         return np.asarray(solver.factor.solve(padded)[reduction.free])
+    except k_errors.TooLarge as failure:
+        _too_large(ctx, failure)
     except k_errors.SingularSystem as failure:
         singular(ctx, system, failure, np.arange(reduction.n) if whole else reduction.free)
 
