@@ -16,7 +16,7 @@ from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
 from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, partners, shared_out
-from gibiane_ops.values.equilibrated import check_balance, equilibrated, guarantee_of, parts_of
+from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
 from gibiane_ops.values.estimates import NORM, TABL, stresses_of
 from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior, held_at, held_directions
 from gibiane_ops.values.failures import worded
@@ -109,7 +109,9 @@ def _bound_with_contact(
     cutting = exact_pieces(ctx, pieces, outside)
     doubts += [cutting] if cutting else []
     guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
-    more = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
+    more: dict[str, Any] = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
+    if all(state.zone.law == "UNILATERAL" for state in states):
+        more |= energy_bounds(solid, float(sum(each.sum() for each in totals)))
     return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, more)
 
 

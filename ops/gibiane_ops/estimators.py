@@ -15,7 +15,7 @@ from gibiane_ops.kernels.estimate.zz import SolidError, stress_energy
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.values.champs import MChaml
-from gibiane_ops.values.equilibrated import check_balance, equilibrated, guarantee_of, parts_of
+from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
 from gibiane_ops.values.estimates import KIND, NORM, REFE, TABL, Guarantee, Parts, results, stresses_of
 from gibiane_ops.values.exterior import LOADS, exterior
 from gibiane_ops.values.failures import worded
@@ -67,7 +67,8 @@ def _constitutive_relation(
     check_balance(ctx, pieces, stress, sides, volu, cl)
     found = equilibrated(ctx, pieces, stress, material, cut_sides(ctx, pieces, sides), volu, sweeps, cl)
     guarantee = guarantee_of(ctx, found, exact_pieces(ctx, pieces, sides))
-    more = {"EQUILIBRE": found.residual, "HISTOIRE": ListReel(found.history)}
+    more: dict[str, Any] = {"EQUILIBRE": found.residual, "HISTOIRE": ListReel(found.history)}
+    more |= energy_bounds(found)
     return results(ctx, parts_of(pieces, found), kind, norm, tabl, guarantee, refe, more)
 
 

@@ -27,7 +27,8 @@ ERRE = operator(
     "counts as held where BLOQ holds all its nodes. 'EXAC': the true error, from an exact stress "
     "or a procedure ('PROC'). 'CONTACT' adds the contact part: an estimate, except with 'RDC', where the sum is "
     "guaranteed without friction and with Tresca's, when contact tractions within the law exist; never with "
-    "Coulomb's: GARANTI and a note tell.",
+    "Coulomb's: GARANTI and a note tell. Where prescribed displacements and gaps are zero, INFERIEURE and SUPERIEURE "
+    "of 'RDC' 'TABL' bound the energy of the exact solution (dual analysis).",
     example="OPTI ERRE IGNO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;",
     see=["OPTION"],
 )

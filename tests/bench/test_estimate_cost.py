@@ -1,0 +1,122 @@
+"""What estimates cost: against the contact solution, per tetrahedron and sweep, and for what they are worth."""
+
+import io
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gibiane.session import Session
+
+BLOCKS = """OPTI DIME 3 ELEM CUB8 ;
+N1 = 8 * {n} ; N2 = 2 * {n} ;
+S1 = (DROI N2 (-25. -25. 0.) (25. -25. 0.)) TRAN N2 (0. 50. 0.) ; V1 = S1 VOLU N2 'TRAN' (0. 0. 50.) ;
+S2 = (DROI N1 (-100. -100. 0.) (100. -100. 0.)) TRAN N1 (0. 200. 0.) ; V2 = S2 VOLU N1 'TRAN' (0. 0. -200.) ;
+MO = (MODE V1 'MECANIQUE' 'ELASTIQUE') ET (MODE V2 'MECANIQUE' 'ELASTIQUE') ; MA = MATE MO 'YOUN' 2.1E5 'NU' 0.3 ;
+MC = MODE (FACE 1 V2) (FACE 1 V1) 'CONTACT' 'FROTTANT' 'COULOMB' ; MATC = MATE MC 'MU' 0.2 ;
+CL = BLOQ 'DEPL' (FACE 2 V2) ;
+P = PRES 'MASS' MO 3.125 (FACE 2 V1) ;
+"""
+CONTACT = "RC JC = RIGI MC MATC ; U = RESO ((RIGI MO MA) ET RC ET CL) (P ET JC) ;"
+CUBE = """OPTI DIME 3 ELEM CUB8 ;
+S = (DROI {n} (0. 0. 0.) (1. 0. 0.)) TRAN {n} (0. 1. 0.) ; V = S VOLU {n} 'TRAN' (0. 0. 1.) ;
+HAUT = FACE 2 V ; BAS = FACE 1 V ;
+{cut}
+MO = MODE V 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 1. 'NU' 0.3 ; CL = BLOQ 'DEPL' BAS ;
+U = RESO ((RIGI MO MA) ET CL) (PRES 'MASS' MO 1. HAUT) ; SIG = SIGM MO MA U ;
+"""
+CUT = "V = CHAN TET4 V ; HAUT = CHAN TRI3 HAUT ; BAS = CHAN TRI3 BAS ;"
+# Energy of the clamped cube under pressure, extrapolated from CUB8 and CU20.
+EXACT = 0.97060
+
+
+def session_of(text):
+    session = Session(out=io.StringIO(), err=io.StringIO())
+    assert session.run_text(text) == 0, session.err.getvalue()
+    return session
+
+
+def runs(session, text):
+    def run():
+        assert session.run_text(text) == 0, session.err.getvalue()
+
+    return run
+
+
+@pytest.mark.bench
+def test_patches_and_map_against_the_contact_solution(bench, sizes):
+    for n in sizes:
+        session = session_of(BLOCKS.format(n=n))
+        contact = runs(session, CONTACT)
+        contact()
+        runs(session, "REA = REAC RC U ; SIG = SIGM MO MA U ;")()
+        judge = runs(session, "XS XC XG CA = ERREUR 'CONTACT' 'SPR' MO SIG MA MC MATC U REA ;")
+        size = f"{520 * n**3} CUB8"
+        bench.compare("SPR + error map", size, judge, {"contact solution": contact}, aim=0.1)
+
+
+@pytest.mark.bench
+def test_bound_per_tetrahedron_and_sweep(bench):
+    bound = "T = ERREUR 'RDC' MO SIG MA CL 'PRES' 1. HAUT 'BALA' {sweeps} 'TABL' ;"
+    found = {}
+    for n in (6, 12):
+        session = session_of(CUBE.format(n=n, cut=CUT))
+        cells = int(session.names()["V"].n_cells)
+        once, thrice = runs(session, bound.format(sweeps=1)), runs(session, bound.format(sweeps=3))
+        best = {}
+        for name, run in (("once", once), ("thrice", thrice)) * 2:
+            start = time.perf_counter()
+            run()
+            best[name] = min(best.get(name, np.inf), time.perf_counter() - start)
+        each = 1e3 * (best["thrice"] - best["once"]) / 2 / cells
+        bench.notes.append(f"RDC, {cells} TET4: {each:.2f} ms a tetrahedron and sweep (aim: below 1)")
+        found[n] = session, once, cells
+    (_, small, few), (_, large, many) = found[6], found[12]
+    size, per = f"{many} TET4", many / few
+    bench.compare("RDC, cost per element", size, large, {f"{few} TET4": small}, aim=1.2, rounds=1, scale=per)
+
+
+@pytest.mark.bench
+def test_cost_against_effectivity(bench):
+    texts = {name: f"T = ERREUR '{name}' MO SIG MA 'TABL' 'REFE' {EXACT} ;" for name in ("MOYE", "MOYC", "PROJ", "SPR")}
+    texts["SPRE"] = f"T = ERREUR MO SIG MA (LISSER 'SPRE' MO SIG CL 'PRES' 1. HAUT) 'TABL' 'REFE' {EXACT} ;"
+    texts["RESI"] = f"T = ERREUR 'RESI' MO SIG MA CL 'PRES' 1. HAUT 'TABL' 'REFE' {EXACT} ;"
+    for sweeps in (1, 2):
+        texts[f"RDC {sweeps}"] = f"T = ERREUR 'RDC' MO SIG MA CL 'PRES' 1. HAUT 'BALA' {sweeps} 'TABL' 'REFE' {EXACT} ;"
+    rows = []
+    for element, cut, n in (("CUB8", "", 10), ("TET4", CUT, 8)):
+        session = session_of(CUBE.format(n=n, cut=cut))
+        solve = runs(session, "U = RESO ((RIGI MO MA) ET CL) (PRES 'MASS' MO 1. HAUT) ;")
+        start = time.perf_counter()
+        solve()
+        solution = time.perf_counter() - start
+        for name, text in texts.items():
+            run = runs(session, text)
+            run()
+            start = time.perf_counter()
+            run()
+            rows.append((element, name, (time.perf_counter() - start) / solution, session.names()["T"].get("THETA")))
+            bench.notes.append(f"{element} {name}: {rows[-1][2]:.2f} of the solution's time, theta {rows[-1][3]:.2f}")
+    chart(rows, Path(__file__).parents[2] / "bench-results" / "estimates.png")
+
+
+def chart(rows, path):
+    """Draw theta against time, one mark an estimate."""
+    from matplotlib.figure import Figure
+
+    path.parent.mkdir(exist_ok=True)
+    figure = Figure(figsize=(7, 4.5), layout="constrained")
+    axes = figure.add_subplot()
+    for element, colour in (("CUB8", "#1f77b4"), ("TET4", "#d95f02")):
+        own = [row for row in rows if row[0] == element]
+        axes.scatter([r[2] for r in own], [r[3] for r in own], color=colour, label=element)
+        for _, name, cost, theta in own:
+            axes.annotate(name, (cost, theta), textcoords="offset points", xytext=(5, 4), fontsize=8)
+    axes.axhline(1.0, color="black", linewidth=0.8)
+    axes.set_xscale("log")
+    axes.set_xlabel("time of the estimate over time of the solution")
+    axes.set_ylabel("estimate over true error")
+    axes.set_title("Clamped cube under pressure: what estimates cost and are worth")
+    axes.legend()
+    figure.savefig(path, dpi=150)
