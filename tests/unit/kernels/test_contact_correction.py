@@ -14,6 +14,7 @@ from gibiane_ops.kernels.contact.correction import Stalled, solve_corrected, tie
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.pairs import joined, node_pairs
+from gibiane_ops.kernels.contact.pardiso_schur import PardisoSchur
 from gibiane_ops.kernels.contact.strategy import plan, solve_on_bodies
 from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
 from gibiane_ops.kernels.elements.table import shape
@@ -220,6 +221,23 @@ def test_a_load_that_slides_is_refused_on_the_exact_stiffness():
             tied_first=True,
         )  # fmt: skip
     assert bodies.is_exact
+
+
+def test_schur_complement_of_pardiso(monkeypatch):
+    pytest.importorskip("pypardiso")
+    for name in ("T1_1", "T4_4h"):
+        _, bodies = bodies_of(name)
+        S = bodies.exact().S
+        b = np.random.default_rng(0).random((bodies.tied.A.shape[0], 2))
+        partial = PardisoSchur(bodies.tied.A, bodies._Kvw, sp.csr_array(bodies._fields.Bw.T @ bodies._KBw))
+        np.testing.assert_allclose(partial.S, S, atol=1e-12 * np.abs(S).max())
+        np.testing.assert_allclose(bodies.tied.A @ partial.solve(b), b, atol=1e-10)
+        monkeypatch.setattr("gibiane_ops.kernels.contact.condense.SCHUR_UNKNOWNS", 0)
+        monkeypatch.setattr("gibiane_ops.kernels.contact.condense.SCHUR_COMPONENTS", 0)
+        monkeypatch.setattr("gibiane_ops.kernels.contact.condense.schur", None)  # not called
+        _, other = bodies_of(name)
+        np.testing.assert_allclose(other.exact().S, S, atol=1e-12 * np.abs(S).max())
+        monkeypatch.undo()
 
 
 def test_plan_by_size_and_memory(monkeypatch):

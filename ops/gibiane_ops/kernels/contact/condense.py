@@ -20,17 +20,22 @@ from gibiane_ops.kernels.contact.fields import Fields
 from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.kernels.contact.pardiso_schur import PardisoSchur
 from gibiane_ops.kernels.contact.relative_motion import rigid_candidates
 from gibiane_ops.kernels.contact.small_model import SmallModel, interpolation, schur, small_model
 from gibiane_ops.kernels.contact.tied import TiedSolver, tied_solver
 from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.errors import SingularSystem, TooLarge
+from gibiane_ops.kernels.packages import is_installed
 from gibiane_ops.kernels.solve import ITERATIVE, Factor
 
 BoolArray = NDArray[np.bool_]
 
 MEMORY_LIMIT = 4e9
 """Bytes that the dense interface may take when the caller sets no limit."""
+
+SCHUR_UNKNOWNS, SCHUR_COMPONENTS = 10_000, 64
+"""Tied unknowns and components of w above which PARDISO's Schur complement is faster than back substitutions."""
 
 REMEMBERED = 6
 """Displacements kept to start the iterations of other loads and coefficients from."""
@@ -115,10 +120,10 @@ class Condensation:
 
         Cost
         ----
-        One solution with the tied matrix per active component of w.
+        One solution with the tied matrix per active component of w; one factorisation where PARDISO is installed.
         """
         if self._exact is None:
-            S = schur(self.tied, self._Kvw, self._Kww(), np.flatnonzero(self.active.ravel()))
+            S = self._schur()
             if self.n_stops:
                 candidates = np.eye(len(S))[:, self.active.ravel()]
             else:
@@ -252,6 +257,26 @@ class Condensation:
         start = self.contact.gap if gap is None else gap
         start = (start - (relative * self.contact.normals).sum(axis=1)) / self._shortening
         return np.concatenate([start, np.zeros(self.n_stops) if stop_values is None else stop_values])
+
+    @property
+    def has_schur(self) -> bool:
+        """Whether PARDISO's own Schur complement serves: it is installed, and back substitutions are many."""
+        large = self.tied.A.shape[0] > SCHUR_UNKNOWNS and self.n_components > SCHUR_COMPONENTS
+        return large and self.tied.direct and is_installed("pardiso")
+
+    def _schur(self) -> FloatArray:
+        columns = np.flatnonzero(self.active.ravel())
+        if self.has_schur:
+            Kww = sp.csr_array(self._fields.Bw.T @ self._KBw)[columns][:, columns]
+            try:
+                found = PardisoSchur(self.tied.A, sp.csr_array(self._Kvw[:, columns]), Kww).S
+            except (SingularSystem, OSError, MemoryError):
+                found = None  # back substitutions with the factor that is there
+            if found is not None:
+                S = np.zeros((self.active.size, self.active.size))
+                S[np.ix_(columns, columns)] = found
+                return S
+        return schur(self.tied, self._Kvw, self._Kww(), columns)
 
     def _Kww(self) -> FloatArray:
         return np.asarray((self._fields.Bw.T @ self._KBw).toarray())

@@ -159,13 +159,16 @@ def solve_on_bodies(
             return solve_corrected(bodies, load, gap, run, again=again, tell=tell)
         except (Stalled, *Failure) as failure:
             seconds = bodies.n_components * bodies.tied.seconds / (8 if bodies.tied.direct else 1)
+            way = f"{bodies.n_components} back substitutions, about {seconds:.0f} s"
+            if bodies.has_schur:
+                way, seconds = "a factorisation of PARDISO", 0.0
             stalled = isinstance(failure, Stalled)
             if seconds > LONGEST:
                 if isinstance(failure, Stalled):
                     raise NotConverged(failure.differences, failure.state) from failure
                 raise
             reason = str(failure) if stalled else "no solution on the small model"
-            say(f"{reason}; exact stiffness by {bodies.n_components} back substitutions, about {seconds:.0f} s")
+            say(f"{reason}; exact stiffness by {way}")
     interface = bodies.interface_of(load, bodies.exact(), gap)
     state = run(interface)
     return Corrected(state, interface, interface.expand(state.w), 0, True)
