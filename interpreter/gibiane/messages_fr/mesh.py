@@ -215,7 +215,6 @@ MESH = {
     "the contour is not closed: {count} free end(s), the first at ({place})": "le contour n'est pas fermé : {count} bout(s) libre(s), le premier en ({place})",
     "open": "ouvert",
     "ELIM joins ends at one place; DROIT L closes a line": "ELIM réunit des bouts au même endroit ; DROIT L ferme une ligne",
-    "numbers and values are not written on pictures yet": "les numéros et valeurs ne s'écrivent pas encore sur les images",
     "no size is given and the density is 0": "aucune taille n'est donnée et la densité est nulle",
     "end with the size of the elements, or set DENS": "finir par la taille des éléments, ou choisir DENS",
     "solids exist in two or three dimensions": "les solides existent en dimension deux ou trois",

@@ -1,6 +1,8 @@
 """Pictures and reports."""
 
 PICTURES: dict[str, str] = {
+    "VTK cannot draw here (no {library}): pictures in space are drawn without it": "VTK ne peut pas dessiner ici (pas de {library}) : les images dans l'espace sont dessinées sans lui",
+    "on Debian: apt install {packages}": "sous Debian : apt install {packages}",
     "index '{key}' of a report is a {type}, not a {wanted}": "l'indice '{key}' d'un rapport est un {type}, pas un {wanted}",
     "the report has no page": "le rapport n'a pas de page",
     "T . 1 = TABL ; T . 1 . 'TITRE' = 'first page' ;": "T . 1 = TABL ; T . 1 . 'TITRE' = 'première page' ;",

@@ -158,7 +158,7 @@ def _draw(ctx: Context, evolution: Evolution, table: Table, words: dict[str, Any
             square="CARR" in words,
         )
 
-    draw(ctx, paint, "e")
+    draw(ctx, paint, "e", wait="NCLK" not in words)
 
 
 def _style(text: Any) -> tuple[str, str | None]:

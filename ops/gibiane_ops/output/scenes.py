@@ -12,6 +12,7 @@ from gibiane_ops.kernels.plot.layers import (
     BODY_COLORS,
     Arrows,
     Dots,
+    Labels,
     Layer,
     Lines,
     Surface,
@@ -21,6 +22,7 @@ from gibiane_ops.kernels.plot.layers import (
     placed,
     used,
 )
+from gibiane_ops.kernels.plot.scales import short
 from gibiane_ops.kernels.plot.skin import skin
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import moved
@@ -52,12 +54,15 @@ class Look:
         How far the solids are moved from one another.
     edges : bool
         Show the edges of the elements.
+    section : bool
+        Show only what the plane crosses.
     """
 
     plane: Plane | None = None
     shrink: float | None = None
     apart: float | None = None
     edges: bool = True
+    section: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,10 +135,10 @@ def cells_layers(
         words = np.array(colours)[pieces == k] if colours is not None else np.array(["DEFA"])
         for word in np.unique(words):
             keep = pieces == k if colours is None else (pieces == k) & (np.array(colours) == word)
-            seen = skin(points, blocks, plane=look.plane, shrink=look.shrink, keep=keep)
+            seen = skin(points, blocks, plane=look.plane, shrink=look.shrink, keep=keep, section=look.section)
             if not seen.facets:
                 continue
-            nodal = values.nodal[seen.node] if values is not None and values.nodal is not None else None
+            nodal = seen.carry(values.nodal) if values is not None and values.nodal is not None else None
             flat = values.flat[seen.cell] if values is not None and values.flat is not None else None
             shade = COLOURS.get(str(word), "") or BODY_COLORS[(first + k) % len(BODY_COLORS)]
             layers.append(
@@ -274,3 +279,39 @@ def of_colour(mesh: Maillage, word: str) -> Maillage:
     index = COLOUR_NAMES.index(word)
     chosen = [(b, b.colours == index) for b in mesh.blocks]
     return Maillage(mesh.store, [Block(b.shape, b.cells[k], b.colours[k]) for b, k in chosen])
+
+
+def number_layers(
+    points: FloatArray, meshes: Sequence[Maillage], look: Look, words: set[str], values: Values | None
+) -> list[Layer]:
+    """Return as text the numbers of nodes ('NOEU'), of elements in their block ('ELEM'), and the values ('CHAM')."""
+    layers: list[Layer] = []
+    nodes = np.unique(np.concatenate([m.nodes for m in meshes]))
+    if look.plane is not None:
+        nodes = nodes[(points[nodes] - look.plane[0]) @ look.plane[1] <= 0.0]
+    if "ELEM" in words or ("CHAM" in words and values is not None and values.flat is not None):
+        first = 0
+        for block in (b for m in meshes for b in m.blocks):
+            centres, cells = _facet_centres(points, block, look)
+            if "ELEM" in words:
+                layers.append(Labels(centres, [str(c + 1) for c in cells], "#a8324a"))
+            else:
+                assert values is not None
+                assert values.flat is not None
+                layers.append(Labels(centres, [short(float(values.flat[first + c]), 3) for c in cells]))
+            first += len(block.cells)
+    if "NOEU" in words:
+        layers.append(Labels(points[nodes], [str(n + 1) for n in nodes], "#1f5fa8", aside=True))
+    if "CHAM" in words and values is not None and values.nodal is not None:
+        known = nodes[np.isfinite(values.nodal[nodes])]
+        layers.append(Labels(points[known], [short(float(values.nodal[n]), 3) for n in known], aside=True))
+    return layers
+
+
+def _facet_centres(points: FloatArray, block: Block, look: Look) -> tuple[FloatArray, IntArray]:
+    """Return where the number of an element can be read: the middle of each facet that it shows, or its own."""
+    if shape(block.shape).dim < 2:
+        return points[block.cells].mean(axis=1), np.arange(len(block.cells))
+    seen = skin(points, [(block.shape, block.cells)], plane=look.plane, shrink=look.shrink, section=look.section)
+    middles = [seen.points[f].mean(axis=1) for f in seen.facets]
+    return np.concatenate(middles) if middles else points[:0], seen.cell

@@ -51,8 +51,49 @@ def next_path(ctx: Context) -> Path:
     return stem.with_name(f"{stem.name}_{number:03d}{extension}")
 
 
-def draw(ctx: Context, picture: Callable[[Path], None], at: str | None = None) -> None:
-    """Write the next picture; without matplotlib say so once and go on: pictures never change results."""
+def vtk_draws(ctx: Context) -> bool:
+    """Tell whether VTK draws the pictures in space; say once what it lacks when it is installed and cannot start."""
+    from gibiane_ops.kernels.plot.vtk_image import DEBIAN_PACKAGES, obstacle
+
+    library = obstacle()
+    if library not in (None, "pyvista") and not ctx.state.get("no vtk"):
+        ctx.state["no vtk"] = True
+        ctx.warn(
+            "G202",
+            "VTK cannot draw here (no {library}): pictures in space are drawn without it",
+            level=0,
+            library=library,
+            packages=" ".join(DEBIAN_PACKAGES),
+            hint="on Debian: apt install {packages}",
+        )
+    return library is None
+
+
+def in_window(ctx: Context) -> bool:
+    """Tell whether pictures go to a window: at the prompt, on a screen, when OPTI 'FTRA' names no file."""
+    if not ctx.session.interactive or ctx.session.options.get("FTRA"):
+        return False
+    from gibiane_ops.kernels.plot.window import screen_exists
+
+    return screen_exists()
+
+
+def draw(
+    ctx: Context,
+    picture: Callable[[Path], None],
+    at: str | None = None,
+    *,
+    window: Callable[[], None] | None = None,
+    wait: bool = True,
+) -> None:
+    """Write the next picture; without matplotlib say so once and go on: pictures never change results.
+
+    At the prompt, on a screen, the picture is shown in a window instead, unless there is nobody to close it (`wait`).
+    """
+    if wait and in_window(ctx):
+        with worded(ctx, at=at):
+            _show(picture, window)
+        return
     path = next_path(ctx)
     try:
         with worded(ctx, at=at):
@@ -64,6 +105,21 @@ def draw(ctx: Context, picture: Callable[[Path], None], at: str | None = None) -
             path=path.as_posix(),
             reason=(failure.strerror or "unknown reason").lower(),
         )
+
+
+def _show(picture: Callable[[Path], None], window: Callable[[], None] | None) -> None:
+    """Open a window: of its own kind, or with the picture in it."""
+    if window is not None:
+        window()
+        return
+    from tempfile import TemporaryDirectory
+
+    from gibiane_ops.kernels.plot.window import show_picture
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        picture(path)
+        show_picture(path)
 
 
 def _attempt(ctx: Context, picture: Callable[[Path], None], path: Path) -> None:

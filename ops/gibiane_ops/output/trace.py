@@ -29,7 +29,7 @@ from gibiane.values import (
 from gibiane_ops.kernels.plot import Layer, Scale, draw_scene
 from gibiane_ops.output import scenes
 from gibiane_ops.output.scenes import Look
-from gibiane_ops.output.targets import COLOURS, draw, title
+from gibiane_ops.output.targets import COLOURS, draw, title, vtk_draws
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.deformee import Deforme, Vecteur
 from gibiane_ops.values.listes import ListReel
@@ -49,11 +49,14 @@ TRAC = operator(
     summary="draw a mesh, a field, a displaced shape or arrows into a file",
     notice="A MAILLAGE, a RIGIDITE (its mesh), a DEFORME, a VECTEUR (over a mesh), a CHPOINT with its mesh or an "
     "MCHAML with its model: a picture for each component, in bands of colour. In space a POINT is the eye. 'COUP' p1 "
-    "p2 p3 takes away what lies on the eye's side of a plane; 'ECLA' x draws every element reduced by x (0.5); 'ECAR' "
-    "x moves the solids apart; 'ARET' shows only the sharp edges; 'QUAL' names the objects; 'TITR' t writes a title. "
-    "An ENTIER is the number of bands, a LISTREEL gives their limits. Hidden parts are never shown: 'CACH' and 'FACE' "
-    "change nothing. The files are numbered: name of OPTI 'FTRA' (.png, .svg or .pdf), else traces/trace_001.png. "
-    "Needs matplotlib; pictures never change results.",
+    "p2 p3 cuts away what lies on the eye's side of a plane, 'SECT' p1 p2 p3 shows only what the plane crosses; 'NOEU' "
+    "'ELEM' 'CHAM' write the numbers of nodes and of elements, and values; 'ECLA' x draws every element reduced by x "
+    "(0.5); 'ECAR' x moves the solids apart; 'ARET' shows only the sharp edges; 'QUAL' names the objects; 'TITR' t "
+    "writes a title. An ENTIER is the number of bands, a LISTREEL gives their limits. Hidden parts are never shown: "
+    "'CACH' and 'FACE' change nothing. The files are numbered: name of OPTI 'FTRA' (.png, .svg or .pdf), else "
+    "traces/trace_001.png. At the prompt, on a screen, a window opens instead when FTRA is not set: it turns with the "
+    "mouse, q closes it, 'NCLK' leaves it out. Needs matplotlib; PyVista draws solids where it is installed. Pictures "
+    "never change results.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0. 0.) (1. 0.)) TRAN 2 (0. 1.) ;\n"
     "TRAC S 'TITR' 'a square' ; TRAC (COOR 1 S) S ;",
     see=["DESSIN", "DEFORME", "VECTEUR", "SORTIR"],
@@ -83,24 +86,24 @@ class _Request:
 
 @TRAC.stream(
     *(Key(w, "accepted, changes nothing") for w in IGNORED),
-    *(Key(w, "numbers or values as text (not drawn yet)") for w in NUMBERS),
+    Key("NOEU", "numbers of the nodes"),
+    Key("ELEM", "numbers of the elements in their block"),
+    Key("CHAM", "values of the field"),
     Key("QUAL", "names of the objects"),
     Key("COUL", "one colour only", Arg("c", MOT, optional=True)),
     Key("ECLA", "elements reduced", Arg("x", FLOTTANT, optional=True)),
     Key("ECAR", "solids moved apart", Arg("x", FLOTTANT, optional=True)),
     Key("COUP", "cut by a plane", Arg("p1", POINT), Arg("p2", POINT), Arg("p3", POINT)),
-    Key("SECT", "as COUP", Arg("p1", POINT), Arg("p2", POINT), Arg("p3", POINT)),
+    Key("SECT", "section by a plane", Arg("p1", POINT), Arg("p2", POINT), Arg("p3", POINT)),
     Key("ARET", "sharp edges only"),
     Key("TITR", "title", Arg("t", MOT)),
     Key("BOIT", "accepted, changes nothing", Arg("g", MAILLAGE)),
     syntax="g:MAILLAGE|field:CHPOINT g|field:MCHAML model:MMODEL|DEFORME|VECTEUR g (eye:POINT) (n:ENTIER|LISTREEL) "
-    "('COUP' p1 p2 p3) ('ECLA' x) ('ECAR' x) ('ARET') ('QUAL') ('TITR' t)",
+    "('COUP'|'SECT' p1 p2 p3) ('NOEU') ('ELEM') ('CHAM') ('ECLA' x) ('ECAR' x) ('ARET') ('QUAL') ('TITR' t)",
 )
 def _trac(ctx: Context, q: Operands) -> None:
     request = _read(ctx, q)
     ctx.places.setdefault("object", ctx.node)
-    if request.words & set(NUMBERS):
-        ctx.warn(251, "numbers and values are not written on pictures yet", level=0)
     if not (request.meshes or request.shapes or request.element):
         if request.nodal or request.arrows:
             raise q.missing(MAILLAGE, "the mesh under the field")
@@ -218,17 +221,25 @@ def _picture(ctx: Context, r: _Request, component: str | None, label: str) -> No
         view = r.eye.coords - centre if r.eye is not None else np.array([1.0, -1.75, 1.0])
         if not view.any():
             ctx.fail(21, "the eye is at the centre of the object", at="object")
-    look = Look(_plane(ctx, r, view), r.shrink, r.apart)
+    look = Look(_plane(ctx, r, view), r.shrink, r.apart, section="SECT" in r.words and view is not None)
     layers, caption = _layers(r, points, look, component)
     for vectors in r.arrows:
         layers += scenes.arrow_layers(points, vectors, scenes.diagonal(points, nodes))
     scale = Scale(title=label, bands=r.bands or 12, limits=r.limits)
     name = title(ctx, r.title)
 
-    def paint(path: Path) -> None:
-        draw_scene(path, layers, view=view, scale=scale, title=name, caption=caption)
+    in_space = view is not None and any(layer.points.shape[1] == 3 for layer in layers)
+    by_vtk = in_space and vtk_draws(ctx)
 
-    draw(ctx, paint, "object")
+    def paint(path: Path) -> None:
+        draw_scene(path, layers, view=view, scale=scale, title=name, caption=caption, by_vtk=by_vtk)
+
+    def open_window() -> None:
+        from gibiane_ops.kernels.plot.window import show_scene
+
+        show_scene(layers, view=view, scale=scale, title=name)
+
+    draw(ctx, paint, "object", window=open_window if by_vtk else None, wait="NCLK" not in r.words)
 
 
 def _plane(ctx: Context, r: _Request, view: FloatArray | None) -> tuple[FloatArray, FloatArray] | None:
@@ -277,4 +288,21 @@ def _layers(r: _Request, points: FloatArray, look: Look, component: str | None) 
         else:
             parts.append(scenes.mesh_layers(base, mesh, look, label=label, first=number))
             caption = caption or f"{sum(m.n_cells for m, _ in r.meshes)} elements"
-    return layers + scenes.spread(parts, look), caption
+    layers += scenes.spread(parts, look)
+    if r.words & set(NUMBERS):
+        layers += _numbers(r, base, look, component)
+    return layers, caption
+
+
+def _numbers(r: _Request, points: FloatArray, look: Look, component: str | None) -> list[Layer]:
+    """Return the numbers and values that are written on the picture."""
+    meshes = [m for m, _ in r.meshes] + [s.mesh for s in (r.shapes.shapes if r.shapes else ())]
+    if r.element is None:
+        values = scenes.of_chpoint(r.nodal[0], component) if r.nodal is not None and component is not None else None
+        return scenes.number_layers(points, meshes, look, r.words, values)
+    layers: list[Layer] = []
+    for zone in r.element[0].zones:
+        if isinstance(zone.zone, ModelZone) and component in zone.names:
+            values = scenes.of_zone(r.element[0], zone.zone, zone.component(str(component)), len(points))
+            layers += scenes.number_layers(points, [zone.zone.mesh], look, r.words, values)
+    return layers

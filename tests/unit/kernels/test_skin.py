@@ -33,10 +33,66 @@ def test_the_skin_is_the_boundary():
     assert (np.einsum("ij,ij->i", outward, centres - np.array([1.5, 0.5, 0.5])) > 0).all()
 
 
-def test_a_cut_leaves_out_whole_cells_and_opens_the_inside():
+def polygon_areas(seen):
+    total = 0.0
+    for f in seen.facets:
+        corners = seen.points[f]
+        for k in range(1, f.shape[1] - 1):
+            cross = np.cross(corners[:, k] - corners[:, 0], corners[:, k + 1] - corners[:, 0])
+            total += 0.5 * float(np.linalg.norm(cross, axis=1).sum())
+    return total
+
+
+def test_a_cut_goes_through_cells_and_is_closed_by_its_section():
     points, blocks = bricks(3)
-    seen = skin(points, blocks, plane=(np.array([1.9, 0, 0]), np.array([1.0, 0, 0])))
-    assert areas(seen) == pytest.approx(2 + 4 * 2)
+    plane = (np.array([1.9, 0, 0]), np.array([1.0, 0, 0]))
+    seen = skin(points, blocks, plane=plane)
+    assert polygon_areas(seen) == pytest.approx(2 + 4 * 1.9)
+    assert set(seen.cell.tolist()) == {0, 1}
+    assert seen.points[np.unique(np.concatenate([f.ravel() for f in seen.facets])), 0].max() == pytest.approx(1.9)
+    alone = skin(points, blocks, plane=plane, section=True)
+    assert polygon_areas(alone) == pytest.approx(1.0)
+    assert alone.cell.tolist() == [1]
+
+
+def test_the_section_of_a_cube_across_its_diagonal_is_a_regular_hexagon():
+    points, blocks = bricks(1)
+    seen = skin(points, blocks, plane=(np.full(3, 0.5), np.ones(3)), section=True)
+    assert [f.shape[1] for f in seen.facets] == [6]
+    assert polygon_areas(seen) == pytest.approx(0.75 * np.sqrt(3.0))
+
+
+@pytest.mark.parametrize("name", ["TET4", "PYR5", "PRI6", "CUB8", "TE10", "PY13", "PR15", "CU20"])
+def test_sections_of_every_solid_are_convex_and_carry_linear_fields_exactly(name):
+    of = shape(name)
+    points = np.column_stack([of.ref_nodes, np.zeros((of.n_nodes, 3 - of.ref_nodes.shape[1]))])
+    blocks = [(name, np.arange(of.n_nodes)[None])]
+    centre = points[: of.n_corners].mean(axis=0)
+    for normal in np.random.default_rng(3).normal(size=(20, 3)):
+        for section in (True, False):
+            seen = skin(points, blocks, plane=(centre, normal), section=section)
+            np.testing.assert_allclose(
+                seen.carry(points @ [1.0, -2.0, 0.5]), seen.points @ [1.0, -2.0, 0.5], atol=1e-12
+            )
+            for f in seen.facets:
+                corners = seen.points[f]
+                assert ((corners - centre) @ normal).max() < 1e-9
+                if section:
+                    sides = np.roll(corners, -1, axis=1) - corners
+                    turns = np.cross(sides, np.roll(sides, -1, axis=1)) @ normal
+                    assert (turns > -1e-12).all() or (turns < 1e-12).all()
+
+
+def test_a_plane_along_a_face_leaves_all_or_nothing():
+    points, blocks = bricks(2)
+    for x, area in ((0.0, 0.0), (1.0, 6.0), (2.0, 10.0)):
+        seen = skin(points, blocks, plane=(np.array([x, 0, 0]), np.array([1.0, 0, 0])))
+        assert polygon_areas(seen) == pytest.approx(area, abs=1e-6), x
+
+
+def test_reduced_cells_are_left_out_whole():
+    points, blocks = bricks(3)
+    seen = skin(points, blocks, shrink=0.5, plane=(np.array([1.6, 0, 0]), np.array([1.0, 0, 0])))
     assert set(seen.cell.tolist()) == {0, 1}
 
 

@@ -84,7 +84,7 @@ def render(
         blend = surface.alpha * over + (under[:, 3] * (1.0 - surface.alpha))[:, None] * under[:, :3]
         image[seen, :3] = blend / opacity[:, None]
         image[seen, 3] = opacity
-    return _average(image), depth
+    return mean_of_samples(image), depth
 
 
 def _triangles(surfaces: Sequence[Surface], camera: Camera, frame: Frame, bands: Bands | None) -> _Triangles:
@@ -117,7 +117,7 @@ def _fans(surface: Surface, camera: Camera, frame: Frame, bands: Bands | None) -
         color = bands.paint(np.asarray(surface.flat, np.float64))[owner]
     normals = facet_normals(points, surface.facets) @ camera.axes.T
     broad = sharp_sides(points, surface.facets)
-    ink = _ink(pixels[sides[:, 1]] - pixels[sides[:, 0]], broad) if surface.edges else np.where(broad, 0.85, 0.0)
+    ink = ink_of(pixels[sides[:, 1]] - pixels[sides[:, 0]], broad) if surface.edges else visible_inks(broad)
     return _Triangles(
         xy=np.stack([fan(pixels[:, 0]), fan(pixels[:, 1])], axis=2),
         depth=fan(screen[:, 2]),
@@ -145,12 +145,18 @@ def _light(normals: FloatArray, soft: bool) -> FloatArray:
     return brightness
 
 
-def _ink(side: FloatArray, broad: BoolArray) -> FloatArray:
+def ink_of(side: FloatArray, broad: BoolArray) -> FloatArray:
     """Choose the darkness of sides: the edges of a fine mesh fade, or they would blacken the picture."""
     length = np.linalg.norm(side, axis=1)
     typical = float(np.median(length)) / FINER if len(length) else 0.0
     mesh = 0.62 * float(np.clip((typical - 2.0) / 9.0, 0.0, 1.0))
     ink: FloatArray = np.where(broad, max(0.85, mesh), mesh)
+    return ink
+
+
+def visible_inks(broad: BoolArray) -> FloatArray:
+    """Choose the darkness of sides when only those that outline the surface are drawn."""
+    ink: FloatArray = np.where(broad, 0.85, 0.0)
     return ink
 
 
@@ -176,7 +182,7 @@ def _shade(triangles: _Triangles, hits: Hits, seen: BoolArray, bands: Bands | No
     return shaded
 
 
-def _average(image: FloatArray) -> FloatArray:
+def mean_of_samples(image: FloatArray) -> FloatArray:
     """Take the mean of the samples of each pixel, each colour counting as much as it is opaque."""
     weighted = np.dstack([image[..., :3] * image[..., 3:], image[..., 3]])
     mean = np.zeros((image.shape[0] // FINER, image.shape[1] // FINER, 4))

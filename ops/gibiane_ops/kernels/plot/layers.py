@@ -122,7 +122,32 @@ class Arrows:
     offset: FloatArray | None = None
 
 
-Layer = Surface | Lines | Dots | Arrows
+@dataclass(frozen=True)
+class Labels:
+    """Short texts at points, left out where a surface hides the point.
+
+    Attributes
+    ----------
+    points : (n, dim) float64, length
+    texts : sequence of n str
+    color, size : str, float
+        Height in typographic points.
+    aside : bool
+        Beside the point, above and to the right, instead of over it.
+    label, offset
+        As in `Surface`.
+    """
+
+    points: FloatArray
+    texts: Sequence[str]
+    color: str = "#1b1f24"
+    size: float = 7.0
+    aside: bool = False
+    label: str = ""
+    offset: FloatArray | None = None
+
+
+Layer = Surface | Lines | Dots | Arrows | Labels
 
 
 def placed(layer: Layer) -> FloatArray:
@@ -130,7 +155,7 @@ def placed(layer: Layer) -> FloatArray:
 
     Parameters
     ----------
-    layer : Surface, Lines, Dots or Arrows
+    layer : Layer
 
     Returns
     -------
@@ -152,7 +177,7 @@ def used(layer: Layer) -> IntArray:
 
     Parameters
     ----------
-    layer : Surface, Lines, Dots or Arrows
+    layer : Layer
 
     Returns
     -------

@@ -12,8 +12,8 @@ from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.plot.camera import DEFAULT_VIEW, Camera, FloatArray, Frame, fit, look_from
 from gibiane_ops.kernels.plot.canvas import INK, MUTED, header, sheet
 from gibiane_ops.kernels.plot.image import FINER, render
-from gibiane_ops.kernels.plot.layers import Arrows, Dots, Layer, Lines, Surface, placed, used
-from gibiane_ops.kernels.plot.raster import visible_runs
+from gibiane_ops.kernels.plot.layers import Arrows, Dots, Labels, Layer, Lines, Surface, placed, used
+from gibiane_ops.kernels.plot.raster import BoolArray, visible_runs
 from gibiane_ops.kernels.plot.scales import Bands, Scale, bands_for, bar_labels, short
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ def draw_scene(
     title: str = "",
     caption: str = "",
     size: tuple[int, int] = (1200, 900),
+    by_vtk: bool = False,
 ) -> None:
     """Draw meshes and fields into a file.
 
@@ -40,7 +41,7 @@ def draw_scene(
     ----------
     path : Path or str
         Extension .png, .svg or .pdf; missing folders are made.
-    layers : sequence of Surface, Lines, Dots or Arrows
+    layers : sequence of Surface, Lines, Dots, Arrows or Labels
         Lines, dots and arrows are drawn over the surfaces in this order; surfaces hide one another as in space.
         When all points have two coordinates the picture is plane, with graduated axes; so is that of points of one
         height seen from above.
@@ -52,6 +53,8 @@ def draw_scene(
         Text at the top, and the smaller line below it.
     size : (int, int)
         Width and height in pixels.
+    by_vtk : bool
+        Let VTK draw the surfaces of a picture in space; only where `vtk_image.obstacle` finds none.
 
     Raises
     ------
@@ -80,19 +83,24 @@ def draw_scene(
     camera = look_from(direction)
     with sheet(path, size) as figure:
         surfaces = [layer for layer in layers if isinstance(layer, Surface)]
-        bands = _bands(surfaces, scale or Scale())
+        bands = bands_of(surfaces, scale or Scale())
         header(figure, title, caption)
         labels = [layer for layer in layers if layer.label]
         axes, width, height = _main_axes(figure, size, plane=plane, bar=bands is not None, foot=bool(labels))
         spans = [camera.project(placed(layer)[used(layer)]) for layer in layers]
         diagonal = float(np.linalg.norm(np.ptp(np.concatenate(spans), axis=0))) or 1.0
-        factors = {id(layer): _arrow_factor(layer, diagonal) for layer in layers if isinstance(layer, Arrows)}
+        factors = {id(layer): arrow_factor(layer, diagonal) for layer in layers if isinstance(layer, Arrows)}
         spans += [camera.project(_tips(a, factors[id(a)])) for a in layers if isinstance(a, Arrows)]
         frame = fit(np.concatenate(spans), width, height)
         axes.set(xlim=frame.extent[:2], ylim=frame.extent[2:])
         if plane:
             _graduate(axes, np.concatenate(spans))
-        image, depth = render(surfaces, camera, frame, bands)
+        if by_vtk and surfaces and not plane:
+            from gibiane_ops.kernels.plot import vtk_image
+
+            image, depth = vtk_image.render(surfaces, camera, frame, bands)
+        else:
+            image, depth = render(surfaces, camera, frame, bands)
         if surfaces:
             axes.imshow(image, origin="lower", extent=frame.extent, interpolation="nearest", aspect="auto", zorder=1.0)
         for order, layer in enumerate(layers):
@@ -112,7 +120,10 @@ def draw_scene(
                         zorder=2.0 + order,
                     )
                 case Arrows():
-                    _draw_arrows(axes, layer, camera, factors[id(layer)], 2.0 + order)
+                    shown = _in_sight(layer, factors[id(layer)], camera, frame, depth, 0.004 * diagonal)
+                    _draw_arrows(axes, layer, camera, factors[id(layer)], shown, 2.0 + order)
+                case Labels():
+                    _draw_texts(axes, layer, camera, frame, depth, 0.004 * diagonal, 2.0 + order)
                 case Surface():
                     pass
         if bands is not None:
@@ -123,7 +134,7 @@ def draw_scene(
             _draw_legend(figure, labels, factors, left=0.03 if plane else 0.16)
 
 
-def _bands(surfaces: Sequence[Surface], scale: Scale) -> Bands | None:
+def bands_of(surfaces: Sequence[Surface], scale: Scale) -> Bands | None:
     """Choose the bands for all the values that are seen, or none."""
     seen = [np.asarray(s.nodal, np.float64)[used(s)] for s in surfaces if s.nodal is not None]
     seen += [np.asarray(s.flat, np.float64) for s in surfaces if s.nodal is None and s.flat is not None]
@@ -200,7 +211,7 @@ def _draw_lines(
     )
 
 
-def _arrow_factor(layer: Arrows, diagonal: float) -> float:
+def arrow_factor(layer: Arrows, diagonal: float) -> float:
     """Length in the picture of a vector of length one."""
     largest = float(np.max(np.linalg.norm(layer.vectors, axis=1), initial=0.0))
     return layer.longest * diagonal / largest if largest > 0.0 else 0.0
@@ -211,12 +222,52 @@ def _tips(layer: Arrows, factor: float) -> FloatArray:
     return placed(ends)
 
 
-def _draw_arrows(axes: Axes, layer: Arrows, camera: Camera, factor: float, order: float) -> None:
+def _in_sight(layer: Arrows, factor: float, camera: Camera, frame: Frame, depth: FloatArray, slack: float) -> BoolArray:
+    """Say which arrows have an end that no surface hides: those wholly inside a solid would only darken it."""
+    ends = [camera.project(placed(layer)), camera.project(_tips(layer, factor))]
+    return _seen(ends[0], frame, depth, slack) | _seen(ends[1], frame, depth, slack)
+
+
+def _seen(screen: FloatArray, frame: Frame, depth: FloatArray, slack: float) -> BoolArray:
+    """Say which points no surface hides."""
+    column, row = np.floor(frame.finer(FINER).pixels(screen)).astype(np.int64).T
+    inside = (column >= 0) & (row >= 0) & (column < depth.shape[1]) & (row < depth.shape[0])
+    nearest = np.full(len(screen), -np.inf)
+    nearest[inside] = depth[row[inside], column[inside]]
+    seen: BoolArray = screen[:, 2] >= nearest - slack
+    return seen
+
+
+def _draw_texts(
+    axes: Axes, layer: Labels, camera: Camera, frame: Frame, depth: FloatArray, slack: float, order: float
+) -> None:
+    from matplotlib.patheffects import withStroke
+
+    screen = camera.project(placed(layer))
+    away = (2.5, 2.0) if layer.aside else (0.0, 0.0)
+    at = ("left", "bottom") if layer.aside else ("center", "center")
+    for i in np.flatnonzero(_seen(screen, frame, depth, slack)).tolist():
+        axes.annotate(
+            layer.texts[i],
+            (screen[i, 0], screen[i, 1]),
+            away,
+            textcoords="offset points",
+            ha=at[0],
+            va=at[1],
+            fontsize=layer.size,
+            color=layer.color,
+            path_effects=[withStroke(linewidth=1.4, foreground="white")],
+            zorder=order,
+            annotation_clip=False,
+        )
+
+
+def _draw_arrows(axes: Axes, layer: Arrows, camera: Camera, factor: float, in_sight: BoolArray, order: float) -> None:
     from matplotlib.patheffects import withStroke
 
     start, tip = camera.project(placed(layer)), camera.project(_tips(layer, factor))
     along = tip - start
-    shown = np.hypot(along[:, 0], along[:, 1]) > 0.0
+    shown = in_sight & (np.hypot(along[:, 0], along[:, 1]) > 0.0)
     axes.quiver(
         start[shown, 0],
         start[shown, 1],
@@ -306,6 +357,8 @@ def _draw_legend(figure: Figure, labels: Sequence[Layer], factors: dict[int, flo
                 largest = float(np.max(np.linalg.norm(layer.vectors, axis=1), initial=0.0))
                 text = f"{layer.label} (longest {short(largest, 3)})"
                 handles.append(Line2D([], [], color=layer.color, marker=r"$\rightarrow$", ms=13, ls="", label=text))
+            case Labels():
+                handles.append(Line2D([], [], color=layer.color, marker="$n$", ms=7, ls="", label=layer.label))
     figure.legend(
         handles=handles,
         loc="lower left",
