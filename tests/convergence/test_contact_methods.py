@@ -1,5 +1,7 @@
 """Every contact method against the exact Newton solution on two blocks, and the numbers that characterise each."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from two_blocks import blocks, load_push
@@ -8,6 +10,7 @@ from gibiane_ops.kernels.contact.augmented import solve_augmented_newton, solve_
 from gibiane_ops.kernels.contact.bipotential import solve_bipotential
 from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring_condition
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
+from gibiane_ops.kernels.contact.interface import bare_interface
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.multipliers import solve_multipliers
 from gibiane_ops.kernels.contact.newton import solve_coulomb
@@ -150,6 +153,26 @@ def test_conditioning_of_the_penalty(g):
     stiffness = g * scene.interface.kref
     found = spring_condition(scene.interface, exact, g, lambda u: apply(u, stiffness), condensed, len(scene.F))
     assert CONDITION[g] / 2 < found < 2 * CONDITION[g]
+
+
+@pytest.mark.parametrize("r", [0.1, 1.0, 100.0])
+def test_conditioning_of_a_model_of_two_nodes(r):
+    # two springs of stiffness 1 and 2 end to end on supports, and r times kref between them when closed
+    K, C = np.diag([1.0, 1.0, 2.0, 2.0]), np.hstack([np.eye(2), -np.eye(2)])
+    kref = 2 / 3
+    S = kref * np.eye(2)
+    A = K + r * kref * C.T @ C
+
+    def condensed(F):
+        # w = u1 - u2 with v = u2: v (k1 + k2) = F1 + F2 - k1 w
+        f = F[:2] - (F[:2] + F[2:]) / 3
+        total = (F[:2] + F[2:]) / 3
+        expand = lambda w: np.concatenate([total + 2 * w.ravel() / 3, total - w.ravel() / 3])  # noqa: E731
+        return replace(bare_interface(S, f, 2), expander=expand)
+
+    closed = solve_coulomb(bare_interface(S, np.array([1.0, 0.1]), 2), 0.5)
+    found = spring_condition(bare_interface(S, np.array([1.0, 0.1]), 2), closed, r, lambda u: A @ u, condensed, 4)
+    assert found == pytest.approx(np.linalg.cond(A), rel=1e-9)
 
 
 def test_matrices_on_the_interface():
