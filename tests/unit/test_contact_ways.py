@@ -1,0 +1,85 @@
+"""RESO by the corrected small model, from a script: same results as by the exact stiffness, told, and interruptible."""
+
+import io
+
+import numpy as np
+import pytest
+
+from gibiane.session import Session
+from gibiane_ops.kernels.contact import strategy
+from gibiane_ops.values import contact_run
+
+SCENE = """OPTI DIME 3 ELEM CUB8 ;
+B = (DROI 6 (0. 0. -6.) (6. 0. -6.)) TRAN 6 (0. 6. 0.) ; V1 = B VOLU 6 'TRAN' (0. 0. 6.) ;
+T = (DROI 3 (2. 2. 0.) (5. 2. 0.)) TRAN 3 (0. 3. 0.) ; V2 = T VOLU 3 'TRAN' (0. 0. 3.) ;
+MO = MODE (V1 ET V2) 'MECANIQUE' 'ELASTIQUE' ; K = RIGI MO (MATE MO 'YOUN' 1000. 'NU' 0.3) ; CL = BLOQ 'DEPL' B ;
+F = (PRES 'MASS' MO 3. (FACE 2 V2)) ET (FORC 'FX' 2. (FACE 2 V2)) ;
+MC = MODE (FACE 2 V1) (FACE 1 V2) 'CONTACT' 'FROTTANT' 'COULOMB' ; RC JC = RIGI MC (MATE MC 'MU' 0.2) ;
+"""
+SOLVE = "T = TABL ; U = RESO (K ET CL ET RC) (F ET JC) 'RAPP' T {} ;"
+
+
+@pytest.fixture
+def session():
+    found = Session(out=io.StringIO(), err=io.StringIO())
+    assert found.run_text(SCENE) == 0, found.err.getvalue()
+    return found
+
+
+@pytest.fixture
+def corrected(monkeypatch):
+    """Take the small model whatever the size, with one ring of nodes."""
+    monkeypatch.setattr(strategy, "SMALL", 0)
+    monkeypatch.setattr(strategy, "FEW", 0)
+    monkeypatch.setattr("gibiane_ops.kernels.contact.small_model.RINGS", 1)
+
+
+def solve(session, options="", words=""):
+    session.state.get("factors", {}).clear()
+    assert session.run_text(options + SOLVE.format(words)) == 0, session.err.getvalue()
+    names = session.names()
+    return {name: values for name, (_, values) in names["U"].parts.items()}, names["T"]
+
+
+@pytest.mark.parametrize("solver", ["DIRE", "ITER"])
+@pytest.mark.parametrize("words", ["", "'TRES'", "'PROJ'"])
+def test_same_solution_and_report(session, request, solver, words):
+    exact, table = solve(session, "", words)
+    request.getfixturevalue("corrected")
+    found, other = solve(session, f"OPTI 'RESO' '{solver}' ;", words)
+    assert contact_of(session).learned is not None
+    for name, values in exact.items():
+        np.testing.assert_allclose(found[name], values, atol=3e-8 * np.abs(values).max())
+    assert list(other.get("STATUTS").values) == list(table.get("STATUTS").values)
+    assert other.get("CONVERGE") is True
+
+
+def contact_of(session):
+    return session.state["factors"]["contact"][3].bodies
+
+
+def test_echo_tells_the_way_and_the_corrections(session, corrected):
+    solve(session, "OPTI ECHO 1 'RESO' 'ITER' ;")
+    told = [line for line in session.out.getvalue().splitlines() if line.startswith(" RESO :")]
+    assert "multigrid, contact corrected on a small model of 16 pairs, about" in told[0]
+    assert told[-1].endswith("corrections")
+
+
+def test_methods_with_laws_of_their_own_take_the_exact_stiffness(session, corrected):
+    solve(session, "", "'PENA' 1.E4")
+    assert contact_of(session).is_exact
+
+
+def test_an_interruption_keeps_the_session(session, corrected, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(contact_run, "solve_on_bodies", interrupted)
+        session.interactive = True
+        session.run_text(SOLVE.format(""))
+        assert "interrupted" in session.err.getvalue()
+    assert "U" not in session.names()
+    first, _ = solve(session)
+    again, _ = solve(session)
+    np.testing.assert_array_equal(first["UX"], again["UX"])
