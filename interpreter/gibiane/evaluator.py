@@ -19,6 +19,9 @@ from gibiane.values import ANY, ENTIER, FLOTTANT, NOTHING, Procedure, Table, Tex
 
 KEEPS_TEXT = frozenset({"TYPE", "TEXTE", "LISTER", "EXISTE", "EGA", "NEG"})
 
+# Operators that end a group when their result is a MOT, which must not be taken for an operator.
+WORD_ENDS = ("CHANGER",)
+
 
 class Evaluator:
     """Runs programs in the frames of one session."""
@@ -285,7 +288,7 @@ class Evaluator:
                 if diag.hint is None and diag.code in ("7", "37", "533") and not diag.trace:
                     diag.hint = _read_otherwise(node, op)
                 raise
-            if op.terminal:
+            if op.terminal or (op.name in WORD_ENDS and q.values and type(q.values[0]) is str and q.nodes[0] is node):
                 break
         if n_targets <= 1 and self.session.point_maker is not None:
             self.make_point(q, self.session.options["DIME"])

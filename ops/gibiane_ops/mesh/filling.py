@@ -78,7 +78,9 @@ def added(ctx: Context, nodes: IntArray, points: FloatArray) -> IntArray:
     return np.concatenate([nodes, new])
 
 
-def fill_contour(ctx: Context, segments: IntArray, size: Size, quadrangles: bool, at: str) -> Maillage:
+def fill_contour(
+    ctx: Context, segments: IntArray, size: Size, quadrangles: bool, at: str, frontal: bool = False
+) -> Maillage:
     """Mesh the inside of closed plane lines."""
     from gibiane_ops.kernels.remesh import mesh_surface
 
@@ -86,12 +88,13 @@ def fill_contour(ctx: Context, segments: IntArray, size: Size, quadrangles: bool
     sizes = sizes_at(ctx, size, nodes)
     dim = dimension(ctx)
     with explained(ctx, at, failed=28):
-        filled = mesh_surface(nodes_of(ctx).coords[nodes][:, :dim], local, sizes, quadrangles=quadrangles)
+        x = nodes_of(ctx).coords[nodes][:, :dim]
+        filled = mesh_surface(x, local, sizes, quadrangles=quadrangles, frontal=frontal)
     ids = added(ctx, nodes, filled.points)
     return new_mesh(ctx, [("QUA4" if quadrangles else "TRI3", ids[filled.cells]), ("TRI3", ids[filled.rest])])
 
 
-def fill_envelope(ctx: Context, facets: IntArray, size: Size, at: str) -> Maillage:
+def fill_envelope(ctx: Context, facets: IntArray, size: Size, at: str, frontal: bool = False) -> Maillage:
     """Mesh the inside of closed surfaces of triangles."""
     from gibiane_ops.kernels.remesh import mesh_volume
 
@@ -99,7 +102,7 @@ def fill_envelope(ctx: Context, facets: IntArray, size: Size, at: str) -> Mailla
     nodes, (local,) = numbered(ctx, [facets])
     sizes = sizes_at(ctx, size, nodes)
     with explained(ctx, at):
-        filled = mesh_volume(nodes_of(ctx).coords[nodes], local, sizes)
+        filled = mesh_volume(nodes_of(ctx).coords[nodes], local, sizes, frontal=frontal)
     ids = added(ctx, nodes, filled.points)
     return new_mesh(ctx, [("TET4", ids[filled.cells])])
 
@@ -197,7 +200,9 @@ MAILLER = operator(
     "boundary is kept as it is, node for node; closed parts inside the largest are cavities. The size "
     "inside follows the boundary, a FLOTTANT, or a CHPOINT on the boundary; where the boundary "
     "is much coarser, elements grow towards it. 'ORDRE' 2 gives mid-nodes, on the boundary those of its elements or of "
-    "its geometry; so does OPTI ELEM of second degree. The same data give the same mesh. Two bodies that touch: make "
+    "its geometry; so does OPTI ELEM of second degree. 'ALGO' 'FRON' advances from the boundary (regular, but coarse "
+    "inside a coarse boundary), 'DELA', the default, inserts points; 'OPTI' is accepted. The same "
+    "data give the same mesh. Two bodies that touch: make "
     "the common face once, and use it and its copy `F2 = F1 PLUS (0. 0. 0.)` in the two envelopes; their nodes then "
     "pair exactly. "
     "`M T = MAILLER 'PAVE' P1 P2 size` meshes a box; 'CYLI' P1 P2 r a cylinder, 'SPHE' C r a ball, 'DEMI' C r V "
@@ -215,9 +220,17 @@ MAILLER = operator(
     SIZE,
     Key("ELEM", "type of the elements", Arg("kind", "MOT")),
     Key("ORDRE", "degree of the elements", Arg("n", ENTIER)),
+    Key("ALGO", "mesher", Arg("mesher", "MOT", "DELA or FRON")),
+    Key("OPTI", "accepted: meshes are always made better at the end"),
     gives=[MAILLAGE],
 )
-def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None, ordre: int | None) -> Maillage:
+def _mailler(
+    ctx: Context, g: Maillage, size: Size, elem: str | None, ordre: int | None, algo: str | None, opti: bool
+) -> Maillage:
+    mesher = "DELA" if algo is None else algo[:4].upper()
+    if mesher not in ("DELA", "FRON"):
+        ctx.fail(7, "unknown mesher '{mesher}'; accepted: 'DELA', 'FRON'", at="algo", mesher=mesher)
+    frontal = mesher == "FRON"
     flat = max((DIMENSION[name] for name in g.shapes), default=0) == 1
     given = elem[:4] if elem is not None else ("TRI3" if flat else "TET4")
     kind = LINEAR.get(given, given)
@@ -231,7 +244,7 @@ def _mailler(ctx: Context, g: Maillage, size: Size, elem: str | None, ordre: int
         )
     degree = checked_degree(ctx, ordre) if ordre is not None else 2 if kind != given or wants_quadratic(ctx, g) else 1
     if flat:
-        filled = fill_contour(ctx, contour_of(ctx, g, "g"), size, kind == "QUA4", "g")
+        filled = fill_contour(ctx, contour_of(ctx, g, "g"), size, kind == "QUA4", "g", frontal)
     else:
-        filled = fill_envelope(ctx, _envelope(ctx, g, "g"), size, "g")
+        filled = fill_envelope(ctx, _envelope(ctx, g, "g"), size, "g", frontal)
     return finished(ctx, filled, degree == 2)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import ENTIER, FLOTTANT, LISTREEL, MAILLAGE, POINT
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTREEL, MAILLAGE, POINT
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
@@ -30,8 +30,9 @@ from gibiane_ops.mesh.building import (
 )
 from gibiane_ops.mesh.degree import every_node, finished, linear_mesh
 from gibiane_ops.mesh.sweeping import Base, add_layers, base_of
+from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.listes import ListReel
-from gibiane_ops.values.maillage import Maillage, Point
+from gibiane_ops.values.maillage import Block, Maillage, Point
 from gibiane_ops.values.middles import middles_of
 
 BoolArray = NDArray[np.bool_]
@@ -46,8 +47,9 @@ VOLU = operator(
     "or OPTI ELEM of second degree, CU20 and PR15. Without N or "
     "with N negative, densities (or 'DINI' and 'DFIN') give the layers, as in DROIT; 'PROG' with a "
     "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
-    "volume in place of S is prolonged from its face 2. `V = ENV VOLU` alone fills a closed envelope "
-    "of triangles with tetrahedra.",
+    "volume in place of S is prolonged from its face 2. `V = S VOLU e V` puts one layer of elements around "
+    "a surface, of thickness e (or a CHPOINT), half on each side along its normals; V tells the outside. "
+    "`V = ENV VOLU` alone fills a closed envelope of triangles with tetrahedra.",
     example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
     "V = S VOLU 3 'TRAN' (0. 0. 1.) ; MESS (NBEL V) ;",
     see=["FACE", "ENVELOPPE", "TRANSLATION", "MAILLER"],
@@ -211,6 +213,52 @@ def _generated(ctx: Context, s: Maillage, gene: Maillage) -> Maillage:
     steps = every_node(ctx, line) if base.quadratic else np.repeat(line, 2)[:-1]
     x, path = base.places, store.coords[steps] - store.coords[line[0]]
     return _sweep(ctx, base, lambda t: x + path[round(2 * t)], rank, (density, density), extended)
+
+
+@VOLU.form(
+    Arg("s", MAILLAGE, "surface"),
+    Arg("thickness", (FLOTTANT, CHPOINT), "thickness"),
+    Arg("v", POINT, "way out"),
+    gives=[MAILLAGE],
+)
+def _thickened(ctx: Context, s: Maillage, thickness: float | ChPoint, v: Point) -> Maillage:
+    """Put a layer of elements around a surface, half the thickness on each side, along the mean normals of nodes."""
+    surface, _ = _base(ctx, s, "s", "2")
+    base, store = base_of(ctx, surface), nodes_of(ctx)
+    if base.quadratic:
+        ctx.fail(
+            16, "a surface of first degree is wanted", at="s", hint="CHAN 'QUADRATIQUE' of the volume adds mid-nodes"
+        )
+    normals = _mean_normals(base, v.coords)
+    if isinstance(thickness, ChPoint):
+        name = thickness.names[0]
+        missing = len(thickness.names) != 1 or len(np.setdiff1d(base.corners, thickness.parts[name][0]))
+        if missing:
+            ctx.fail(181, "the field of thicknesses has one component, at every node of the surface", at="thickness")
+        half = thickness.at(name, base.corners) / 2
+    else:
+        half = np.full(len(base.corners), thickness / 2)
+    if not (half > 0).all():
+        ctx.fail(41, "a thickness is a length: {value} cannot be one", at="thickness", value=float(2 * half.min()))
+    x = store.coords[base.corners].copy()
+    bottom = store.add(x - half[:, None] * normals, store.density[base.corners])
+    blocks = [Block(b.shape, bottom[np.searchsorted(base.corners, b.cells)], b.colours) for b in base.mesh.blocks]
+    below = base_of(ctx, Maillage(store, blocks))
+    step = 2 * half[:, None] * normals
+    return _sweep(ctx, below, lambda t: below.places + t * step, np.array([0.0, 1.0]), (0.0, 0.0), None)
+
+
+def _mean_normals(base: Base, outward: FloatArray) -> FloatArray:
+    """Return unit normals at the nodes of a surface, means of those of its elements, on the side of a vector."""
+    x = base.mesh.store.coords
+    total = np.zeros((len(base.corners), 3))
+    for block in base.mesh.blocks:
+        corners = x[block.cells]
+        n = block.cells.shape[1]
+        area = sum(np.cross(corners[:, k], corners[:, (k + 1) % n]) for k in range(n))
+        area = np.where((area @ outward < 0)[:, None], -area, area)
+        np.add.at(total, np.searchsorted(base.corners, block.cells).ravel(), np.repeat(area, n, axis=0))
+    return np.asarray(total / np.linalg.norm(total, axis=1, keepdims=True), np.float64)
 
 
 @VOLU.form(

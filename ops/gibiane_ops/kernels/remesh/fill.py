@@ -22,6 +22,8 @@ from gibiane_ops.kernels.remesh.session import (
 
 # A mesh of fewer elements than this part of what the sizes ask for is made again by another method.
 FAR_FROM_WANTED = 8.0
+# Codes of gmsh for its frontal meshers.
+FRONTAL_2D, FRONTAL_3D = 6, 4
 # Points along each side of the grid that carries sizes divided by a scale.
 GRID = 65
 
@@ -50,7 +52,9 @@ def _check_sizes(sizes: float | FloatArray | None) -> None:
         raise BadValue("size", float(np.min(sizes)), "size > 0")
 
 
-def mesh_volume(points: FloatArray, facets: IntArray, sizes: float | FloatArray | None = None) -> FilledMesh:
+def mesh_volume(
+    points: FloatArray, facets: IntArray, sizes: float | FloatArray | None = None, *, frontal: bool = False
+) -> FilledMesh:
     """Fill a closed envelope of triangles with tetrahedra.
 
     Parameters
@@ -61,6 +65,8 @@ def mesh_volume(points: FloatArray, facets: IntArray, sizes: float | FloatArray 
     sizes : float or (n_points,) float64, length, optional
         Edge wanted inside, one value or one per node of the envelope; by default the spacing of the envelope. Where
         the envelope is much coarser, elements grow from the size inside to its facets.
+    frontal : bool
+        Advance from the envelope instead of inserting points into a Delaunay mesh.
 
     Returns
     -------
@@ -82,7 +88,7 @@ def mesh_volume(points: FloatArray, facets: IntArray, sizes: float | FloatArray 
     """
     _check_sizes(sizes)
     shells = _shells(facets)
-    filled = _filled(points, shells, sizes)
+    filled = _filled(points, shells, sizes, frontal)
     if sizes is not None and len(filled.cells) < _wanted(filled, sizes) / FAR_FROM_WANTED:
         # Gmsh puts no point inside a coarse envelope whatever the size; its parallel mesher (HXT) does, but does not
         # give the same mesh twice.
@@ -113,12 +119,13 @@ def _size_of(points: FloatArray, used: IntArray, sizes: float | FloatArray) -> C
     return size
 
 
-def _filled(points: FloatArray, shells: list[IntArray], sizes: float | FloatArray | None) -> FilledMesh:
+def _filled(points: FloatArray, shells: list[IntArray], sizes: float | FloatArray | None, frontal: bool) -> FilledMesh:
     """Run the mesher inside closed surfaces."""
     used = np.unique(np.concatenate(shells))
     tags = np.zeros(len(points), np.int64)
     tags[used] = np.arange(1, len(used) + 1)
-    with gmsh_model({"Mesh.MeshSizeExtendFromBoundary": 1 if sizes is None else 0}) as gmsh:
+    extend = {"Mesh.MeshSizeExtendFromBoundary": 1 if sizes is None else 0}
+    with gmsh_model(extend | ({"Mesh.Algorithm3D": FRONTAL_3D} if frontal else {})) as gmsh:
         box = [np.ptp(points[shell], axis=(0, 1)).prod() for shell in shells]
         # The nodes are numbered once; each shell is an entity of its own.
         for number, shell in enumerate(shells, 1):
@@ -220,6 +227,7 @@ def mesh_surface(
     *,
     quadrangles: bool = False,
     scale: Callable[[FloatArray], FloatArray] | None = None,
+    frontal: bool = False,
 ) -> FilledMesh:
     """Fill closed plane contours with triangles or quadrangles.
 
@@ -235,6 +243,8 @@ def mesh_surface(
     scale : callable, optional
         ``scale(points) -> (k,)``, for points of the plane z = 0 that stand for those of a surface: by how much lengths
         grow there. Sizes are wanted on the surface, and must be given.
+    frontal : bool
+        Advance from the contours instead of inserting points into a Delaunay mesh.
 
     Returns
     -------
@@ -264,7 +274,8 @@ def mesh_surface(
     height = (space[used] - space[used[0]]) @ normal
     if np.abs(height).max() > 1e-6 * np.ptp(space[used], axis=0).max():
         raise MeshingFailed("the contours are not in one plane")
-    with gmsh_model({"Mesh.MeshSizeExtendFromBoundary": 1 if sizes is None else 0}) as gmsh:
+    extend = {"Mesh.MeshSizeExtendFromBoundary": 1 if sizes is None else 0}
+    with gmsh_model(extend | ({"Mesh.Algorithm": FRONTAL_2D} if frontal else {})) as gmsh:
         geo = gmsh.model.geo
         for node in used:
             geo.addPoint(*space[node], 0, int(node) + 1)
