@@ -80,7 +80,7 @@ GEOMETRY: dict[str, str] = {
     "there is no load {name}; there are {names}": "il n'y a pas de chargement {name} ; il y a {names}",
     "unknown mesher '{mesher}'; accepted: 'DELA', 'FRON'": "mailleur inconnu '{mesher}' ; acceptés : 'DELA', 'FRON'",
     "a surface of first degree is wanted": "il faut une surface du premier degré",
-    "CHAN 'QUADRATIQUE' adds mid-nodes after": "CHAN 'QUADRATIQUE' ajoute ensuite les noeuds milieux",
+    "CHAN 'QUADRATIQUE' of the volume adds mid-nodes": "CHAN 'QUADRATIQUE' ajoute ensuite les noeuds milieux",
     "the field of thicknesses has one component, at every node of the surface": "le champ des épaisseurs a une composante, en chaque noeud de la surface",
     "a thickness is a length: {value} cannot be one": "une épaisseur est une longueur : {value} n'en est pas une",
 }
