@@ -2,6 +2,7 @@
 # make test    the test suite (slow and bench tests are left out)
 # make check   format, lint, types, layers, generated documents
 # make bench   time and memory of a few scenes
+# make report  the thesis's chapter 3 run again, short: examples/these/results/rapport.html
 # make fuzz    random scripts for some minutes
 # make clean   remove what the others made
 #
@@ -13,7 +14,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 DEMO := examples/adaptation
 
-.PHONY: demo test check bench fuzz clean venv venv-dev
+.PHONY: demo test check bench report fuzz clean venv venv-dev
 .DEFAULT_GOAL := demo
 
 $(BIN)/python:
@@ -52,9 +53,14 @@ check: venv-dev
 bench: venv
 	$(BIN)/python -m pytest -m bench -s
 
+report: venv
+	cd examples/these && $(abspath $(BIN))/gibiane rapport.dgibi
+
+# RAPIDE=FAUX, by hand, is the long one: gibiane rapport.dgibi RAPIDE=FAUX --workers 2
+
 fuzz: venv
 	GIBIANE_FUZZ=20000 $(BIN)/python -m pytest tests/properties/test_fuzz.py
 
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache examples/*/results
+	rm -rf $(VENV) build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache examples/*/results examples/*/*/results
 	find interpreter ops tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -35,11 +35,24 @@ def describe(op: Operator) -> str:
     return "\n".join(lines)
 
 
+def header(word: str, text: str) -> str:
+    """Return the comment that a procedure file begins with: its notice."""
+    lines = []
+    for line in text.splitlines():
+        if not line.startswith(("*", "$$$$")):
+            break
+        lines.append(line.removeprefix("*").removeprefix(" ") if line.startswith("*") else f"{word}: a procedure")
+    return "\n".join(lines).strip()
+
+
 def notice(ctx: Context, word: str, node: Any) -> str:
-    """Return the notice that INFO prints for a word."""
+    """Return the notice that INFO prints for a word: an operator, else a procedure in a file."""
     op = registry.find(word)
     if op is not None:
         return describe(op)
+    source = ctx.session.library.find(word) if word.isidentifier() else None
+    if source is not None:
+        return header(word, source.text)
     ctx.places["word"] = node
     missing = cast3m.meant(word)
     if missing is not None:

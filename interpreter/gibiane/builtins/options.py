@@ -322,9 +322,10 @@ def _titre(ctx: Context, q: Operands) -> None:
 INFO = operator(
     "INFO",
     topic="language",
-    summary="describe an operator",
+    summary="describe an operator or a procedure",
     terminal=True,
-    notice="Prints the forms, operands, keywords and an example of an operator.",
+    notice="Prints the forms, operands, keywords and an example of an operator, or the comment at the head of a procedure "
+    "file: of the script's folder, of the current one, or shipped (INFO ADAPTER ;).",
     example="INFO MESS ;",
 )
 
