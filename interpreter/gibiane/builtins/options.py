@@ -324,8 +324,8 @@ INFO = operator(
     topic="language",
     summary="describe an operator or a procedure",
     terminal=True,
-    notice="Prints the forms, operands, keywords and an example of an operator, or the comment at the head of a procedure "
-    "file: of the script's folder, of the current one, or shipped (INFO ADAPTER ;).",
+    notice="Prints the forms, operands, keywords and an example of an operator, or the comment at the head of a "
+    "procedure file: of the script's folder, of the current one, or shipped (INFO ADAPTER ;).",
     example="INFO MESS ;",
 )
 
