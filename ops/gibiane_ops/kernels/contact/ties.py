@@ -57,7 +57,8 @@ def tie_contact(
     plain = contact.plain
     if plain.all():
         return tie(n_dofs, d, contact.pairs, fixed, _shared(n_dofs, d, contact, fixed))
-    Bv, part, B0, free_plain = tie(n_dofs, d, contact.pairs[plain], fixed, _shared(n_dofs, d, contact, fixed)[plain])
+    left_out = _shared(n_dofs, d, contact, fixed)
+    Bv, part, B0, free_plain = tie(n_dofs, d, contact.pairs[plain], fixed, left_out[plain])
     n = len(plain)
     free = np.zeros((n, d), dtype=bool)
     free[plain] = free_plain
@@ -66,14 +67,14 @@ def tie_contact(
     rows = sp.csr_array(sp.kron(contact.matrix(n_dofs // d)[~plain], sp.eye_array(d), format="csr"))
     place = np.flatnonzero(np.repeat(~plain, d))
     slave = (d * contact.pairs[~plain, :1] + np.arange(d)).ravel()
-    return *_interpolated(rows, place, slave, contact.normals[~plain], Bv, Bw, B0, free), free
+    return *_interpolated(rows, place, slave, contact.normals[~plain], left_out[~plain], Bv, Bw, B0, free), free
 
 
 def _shared(n_dofs: int, d: int, contact: ContactPairs, fixed: IntArray) -> BoolArray:
-    """Share out the displacement of nodes that lie in a corner of obstacles: each pair has its normal alone.
+    """Share out the displacement of nodes in a corner of obstacles or of one master node: each pair has its normal.
 
-    What slides along one obstacle moves towards the other; friction of these nodes is left out. Obstacles that are not
-    along the axes stay as they are, and are refused.
+    What slides along one side moves towards the other; friction of these nodes is left out. Corners that are not along
+    the axes stay as they are, and are refused.
     """
     left_out = np.zeros(contact.normals.shape, dtype=bool)
     held = np.zeros(n_dofs + d, dtype=bool)
@@ -81,12 +82,14 @@ def _shared(n_dofs: int, d: int, contact: ContactPairs, fixed: IntArray) -> Bool
     held[n_dofs:] = True
     master = np.where(contact.pairs[:, 1] < 0, n_dofs // d, contact.pairs[:, 1])
     still = held[d * master[:, None] + np.arange(d)].all(axis=1) & contact.plain
+    rows = contact.matrix(n_dofs // d)
     axis = np.abs(contact.normals).argmax(axis=1)
-    along = still & (np.abs(contact.normals).max(axis=1) > 1 - NONE)
-    nodes, count = np.unique(contact.pairs[still, 0], return_counts=True)
+    along = np.abs(contact.normals).max(axis=1) > 1 - NONE
+    nodes, count = np.unique(contact.pairs[:, 0], return_counts=True)
     for node in nodes[count > 1]:
-        mine = np.flatnonzero(still & (contact.pairs[:, 0] == node))
-        if along[mine].all() and len(np.unique(axis[mine])) == len(mine):
+        mine = np.flatnonzero(contact.pairs[:, 0] == node)
+        same = still[mine].all() or np.abs(rows[mine] - rows[mine[[0] * len(mine)]]).max() < 1e-9
+        if same and along[mine].all() and len(np.unique(axis[mine])) == len(mine):
             left_out[mine] = True
             left_out[mine, axis[mine]] = False
     return left_out
@@ -97,6 +100,7 @@ def _interpolated(
     place: IntArray,
     slave: IntArray,
     normals: FloatArray,
+    left_out: BoolArray,
     Bv: sp.csr_array,
     Bw: sp.csr_array,
     B0: sp.csr_array,
@@ -111,7 +115,7 @@ def _interpolated(
     on_normal = (held & (np.abs(normals) > HELD)).any(axis=1, keepdims=True)
     master_held: BoolArray = np.reshape(np.diff(_cleaned(rows @ B0).indptr), (-1, d)) > 1
     empty: BoolArray = np.reshape(np.diff(G.indptr), (-1, d)) == 0
-    wanted = np.asarray(~(held & (empty | (master_held & ~on_normal)))).ravel()
+    wanted = np.asarray(~(held & (empty | (master_held & ~on_normal))) & ~left_out).ravel()
     pivot, wanted = _pivots(G, lead, wanted)
     chosen = np.flatnonzero(wanted)
     free.reshape(-1)[place[chosen]] = True
