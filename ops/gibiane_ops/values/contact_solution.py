@@ -173,8 +173,8 @@ def _refuse_held(ctx: Context, pairs: ContactPairs, active: NDArray[np.bool_], f
     if lost.any():
         ctx.fail(
             "G407",
-            "nodes of the slave surface are held, or lie in a corner that leans, and the master cannot follow them all: "
-            "{count} would be left without contact, the first at ({where})",
+            "nodes of the slave surface are held, or lie in a corner that leans, and the master cannot follow them "
+            "all: {count} would be left without contact, the first at ({where})",
             at="k",
             count=int(lost.sum()),
             where=" ".join(f"{x:g}" for x in pairs.points[np.flatnonzero(lost)[0]]),
