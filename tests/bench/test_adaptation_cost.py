@@ -1,7 +1,7 @@
 """Size maps, meshes from a field of sizes against gmsh alone, and the least cost for a prescribed error.
 
-The exhaustive table runs every method and element on three scenes; the time of ADAPTER 'OBJE' 'COUT', choice included, is
-compared to the best of those that reach the error. It takes a few minutes.
+The exhaustive table runs every method and element on three scenes; the time of ADAPTER 'OBJE' 'COUT', choice included,
+is compared to the best of those that reach the error. It takes a few minutes.
 """
 
 import io
@@ -102,7 +102,9 @@ def test_least_cost(bench, scene):
             status, found, seconds = run(text)
             if status < 8 and str(found.get("ARRET")) == "ATTEINT":
                 table[f"{element} {method}"] = seconds
-            bench.notes.append(f"{scene}: {element} {method} {seconds:.2f} s, {found.get('ARRET') if found else 'failed'}")
+            bench.notes.append(
+                f"{scene}: {element} {method} {seconds:.2f} s, {found.get('ARRET') if found else 'failed'}"
+            )
     status, found, seconds = run(f"T1 = {make} ; T2 = ADAPTER T1 'OBJE' 'COUT' {options} 'NPAS' 6 ;")
     assert status < 8
     bench.notes.append(f"{scene}: COUT {seconds:.2f} s, {found.get('CHOIX')}, {found.get('ARRET')}")

@@ -7,7 +7,9 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, TABLE, Table
-from gibiane_ops.kernels import topology
+from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels.adapt.sizes import element_sizes, predicted_count
+from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import MeshingFailed
 from gibiane_ops.kernels.mesh import unions
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
@@ -17,6 +19,9 @@ from gibiane_ops.mesh.groups import Groups
 from gibiane_ops.mesh.local import divide, move_nodes
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.maillage import Maillage
+
+NEAR_ENOUGH = 0.05
+"""Relative difference of the number of elements below which a mesh whose boundary is kept is left as it is."""
 
 REMA = operator(
     "REMAILLER",
@@ -154,8 +159,24 @@ def _kept_boundary(ctx: Context, g: Maillage, bord: Maillage, size: float | ChPo
             total=len(facets),
             hint="ENVE (in the plane CONT) gives the whole boundary",
         )
+    if _has_these_sizes(ctx, corners, size):
+        return g
     mesh = fill_envelope(ctx, facets, size, "g") if dim == 3 else fill_contour(ctx, facets, size, False, "g")
     return finished(ctx, mesh, is_quadratic(g))
+
+
+def _has_these_sizes(ctx: Context, g: Maillage, size: float | ChPoint) -> bool:
+    """Say whether a mesh is what would be made: as many elements within 5 %, each within a factor 2."""
+    block = g.blocks[0]
+    of = shape(block.shape)
+    nodes = g.nodes
+    points = nodes_of(ctx).coords[nodes][:, : dimension(ctx)]
+    cells = np.searchsorted(nodes, block.cells)
+    wanted = np.broadcast_to(np.asarray(sizes_at(ctx, size, nodes), np.float64), len(nodes))
+    present = element_sizes(of, np.abs(geometry.measures(of, points[cells])))
+    asked = predicted_count(points, [(block.shape, cells)], wanted)
+    ratio = present / wanted[cells].mean(axis=1)
+    return bool(abs(len(cells) / asked - 1) <= NEAR_ENOUGH and ratio.min() >= 0.5 and ratio.max() <= 2.0)
 
 
 @REMA.form(Arg("g", MAILLAGE, "mesh"), SIZE, SOUC, gives=[MAILLAGE])

@@ -8,6 +8,7 @@ import scipy.sparse as sp
 
 from gibiane_ops.kernels import assembly, geometry, topology
 from gibiane_ops.kernels.adapt import bisection, hanging, hierarchy, octree
+from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.materials import isotropic
@@ -295,3 +296,46 @@ def test_nodes_at_one_place_in_two_solids_do_not_hang():
     P = np.vstack([a, b + [0, 1]])
     nodes, _ = hanging.hanging_nodes(P, [("QUA4", np.vstack([cells_a, cells_b + len(a)]))])
     assert len(nodes) == 0
+
+
+@pytest.mark.parametrize("kind", ["simplex", "tensor"])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_patch_test_across_degrees_and_energy_grows_with_the_quadratic_zone(kind, dim):
+    """Linear and quadratic elements side by side: linear fields exact, and the energy of a load never decreases."""
+    from scipy.sparse.linalg import spsolve
+
+    points, cells = (simplices if kind == "simplex" else grid)(3, dim)
+    points = moved_inside(points, np.random.default_rng(8), 0.04)
+    name = NAMES[kind, dim]
+    high = shape(QUADRATIC[name])
+    pairs = np.sort(cells[:, np.array([edge[:2] for edge in high.edges])].reshape(-1, 2), axis=1)
+    edges, index = np.unique(pairs, axis=0, return_inverse=True)
+    P = np.vstack([points, points[edges].mean(axis=1)])
+    both = np.hstack([cells, len(points) + index.reshape(len(cells), -1)])
+    centre = points[cells].mean(axis=1)[:, 0]
+    energies = []
+    for limit in (0.0, 0.4, 0.7, 1.0):
+        zone = centre < limit
+        blocks = [(n, c) for n, c in ((name, cells[~zone]), (high.name, both[zone])) if len(c)]
+        nodes, masters = hanging.hanging_nodes(P, blocks)
+        assert bool(len(nodes)) == (0 < limit < 1)
+        T = sp.csr_array(sp.kron(hanging.relation_matrix(len(P), nodes, masters), sp.eye_array(dim)))
+        D = isotropic(1.0, 0.3, FAMILY[dim])
+        K = assembly.assemble(len(P), dim, [(c, assembly.element_stiffness(shape(n), P[c], D)) for n, c in blocks])
+        own = np.setdiff1d(np.arange(len(P)), nodes)
+        used = np.zeros(len(P), bool)
+        for _, c in blocks:
+            used[c] = True
+        u = P @ np.random.default_rng(1).uniform(-1, 1, (dim, dim))
+        inside = ((P[own] > 1e-12) & (P[own] < 1 - 1e-12)).all(axis=1) & used[own]
+        assert abs((T.T @ (K @ u.ravel())).reshape(-1, dim)[inside]).max() <= 1e-12
+        F = np.zeros((len(P), dim))
+        for facets in topology.boundary(blocks).values():
+            top = facets.nodes[np.isclose(P[facets.nodes][:, :, -1], 1).all(axis=1)]
+            if len(top):
+                load = assembly.distributed_load(shape(facets.name), P[top], np.eye(dim)[0])
+                F += assembly.assemble_vector(len(P), dim, [(top, load)]).reshape(-1, dim)
+        free = np.flatnonzero(np.repeat(used[own] & (P[own, -1] > 1e-12), dim))
+        A, b = sp.csc_array(T.T @ K @ T)[free][:, free], (T.T @ F.ravel())[free]
+        energies.append(float(b @ spsolve(A, b)))
+    assert (np.diff(energies) > 0).all()
