@@ -276,6 +276,10 @@ def test_a_view_is_painted_in_the_colours_of_its_legend_with_its_arrows(page):
     shade = float(seen @ red / (red @ red))
     assert 0.6 < shade < 1.05
     np.testing.assert_allclose(seen, shade * red, atol=0.05)
+    page.value("[...document.querySelectorAll('.tools label')].find((l) => l.textContent === 'see through').click()")
+    glassy = pixels(page)
+    covered = image.min(axis=2) < 0.97
+    assert glassy[covered].mean() > image[covered].mean() + 0.1
     limits = page.value("gibiane.views.block.limits")
     values = page.session.globals.names["CARTE"].zones[0].component("SCAL")
     assert limits[0] <= values.min()

@@ -82,8 +82,9 @@ class GlPainter {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
   }
-  draw(camera, factor, edges) {
+  draw(camera, factor, edges, glassy) {
     const gl = this.gl, at = this.at, canvas = gl.canvas;
+    gl.depthMask(true); // or the depths of the last drawing would stay
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniformMatrix3fv(at.axes, false, [0, 1, 2].flatMap((j) => camera.axes.map((axis) => axis[j])));
@@ -96,7 +97,8 @@ class GlPainter {
       const banded = part.banded && this.bands > 0 && part.buffers.value;
       gl.uniform1f(at.factor, part.moved ? factor : 0);
       gl.uniform1f(at.lift, part.lines ? 0.0012 : 0);
-      gl.uniform4f(at.color, ...rgb(part.color), part.opacity ?? 1);
+      gl.uniform4f(at.color, ...rgb(part.color), part.banded && glassy ? 0.3 : (part.opacity ?? 1));
+      gl.depthMask(!(part.banded && glassy));
       gl.uniform1f(at.bands, banded ? this.bands : 0);
       gl.uniform1f(at.lit, part.lines ? 0 : 1);
       ["position", "moved", "value"].forEach((name) => {
@@ -111,6 +113,14 @@ class GlPainter {
         gl.enableVertexAttribArray(place);
         gl.vertexAttribPointer(place, found[1], gl.FLOAT, false, 0, 0);
       });
+      if (part.arrows) {
+        // what a solid hides of an arrow still shows, pale: forces between two solids would never be seen
+        gl.disable(gl.DEPTH_TEST);
+        gl.uniform4f(at.color, ...rgb(part.color), 0.4);
+        gl.drawArrays(gl.TRIANGLES, 0, part.count);
+        gl.enable(gl.DEPTH_TEST);
+        gl.uniform4f(at.color, ...rgb(part.color), 1);
+      }
       gl.drawArrays(part.lines ? gl.LINES : gl.TRIANGLES, 0, part.count);
     }
   }
@@ -131,7 +141,7 @@ class PlainPainter {
   colours(list) {
     this.list = list;
   }
-  draw(camera, factor, edges) {
+  draw(camera, factor, edges, glassy) {
     const pen = this.pen, { width, height } = this.canvas, ratio = width / camera.width;
     pen.fillStyle = "#fff";
     pen.fillRect(0, 0, width, height);
@@ -152,14 +162,14 @@ class PlainPainter {
           const t = (part.value[i] + part.value[i + 1] + part.value[i + 2]) / 3;
           color = t < -0.5 ? "#c8c8c8" : this.list[Math.max(0, Math.min(this.list.length - 1, Math.floor(t * this.list.length)))];
         }
-        shapes.push([deep + (part.lines ? 0.004 * camera.radius : 0), corners, color, part]);
+        shapes.push([deep + (part.arrows ? 4 * camera.radius : part.lines ? 0.004 * camera.radius : 0), corners, color, part]);
       }
     }
     shapes.sort((a, b) => a[0] - b[0]);
     for (const [, corners, color, part] of shapes) {
       pen.beginPath();
       corners.forEach(([a, b], k) => (k ? pen.lineTo(a * ratio, b * ratio) : pen.moveTo(a * ratio, b * ratio)));
-      pen.globalAlpha = part.opacity ?? 1;
+      pen.globalAlpha = part.banded && glassy ? 0.3 : (part.opacity ?? 1);
       pen.strokeStyle = pen.fillStyle = color;
       pen.lineWidth = part.lines ? ratio : 0.7 * ratio;
       if (!part.lines) pen.fill();

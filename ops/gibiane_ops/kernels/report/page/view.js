@@ -56,6 +56,7 @@ class View {
     this.arrows = block.arrows.map((each) => ({ ...each, points: decoded(each.points), vectors: decoded(each.vectors), moved: each.moved && decoded(each.moved) }));
     this.factor = this.moved ? block.factor : 0;
     this.withEdges = true;
+    this.glassy = false;
     this.shown = 0;
     this.measure();
     this.camera = new Camera(this.radius, block.flat);
@@ -110,7 +111,7 @@ class View {
     this.surfaces = parts.length;
     parts.push({ position: this.spread(this.edges, this.points, true), moved: moved(this.edges), lines: true, edge: true, color: "#171c24", opacity: 0.55 });
     parts.push({ position: this.spread(this.lines, this.points, true), moved: moved(this.lines), lines: true, color: "#20324a" });
-    for (const each of this.arrows) parts.push({ ...this.arrowSolids(each), color: each.color });
+    for (const each of this.arrows) parts.push({ ...this.arrowSolids(each), arrows: true, color: each.color });
     this.parts = parts.filter((part) => part.position.length);
     this.painter.load(this.parts);
     this.node = make("div", { class: "frame" }, this.tools(), this.stage);
@@ -128,7 +129,8 @@ class View {
       button("y", "seen along -y", () => this.camera.turn(-90, 0)),
       button("z", "seen from above", () => this.camera.turn(-90, 90)),
       button("-z", "seen from below", () => this.camera.turn(-90, -90)),
-      make("label", {}, make("input", { type: "checkbox", checked: "", onchange: (event) => { this.withEdges = event.target.checked; this.draw(); } }), "edges"));
+      make("label", {}, make("input", { type: "checkbox", checked: "", onchange: (event) => { this.withEdges = event.target.checked; this.draw(); } }), "edges"),
+      make("label", {}, make("input", { type: "checkbox", onchange: (event) => { this.glassy = event.target.checked; this.draw(); } }), "see through"));
     if (this.moved) {
       const label = make("span", {}, `displacements × ${brief(this.factor)}`);
       const slider = make("input", { type: "range", min: 0, max: 2, step: 0.05, value: 1, "aria-label": "amplification" });
@@ -192,7 +194,7 @@ class View {
   draw() {
     if (this.camera.width <= 1) return;
     this.seen = null;
-    this.painter.draw(this.camera, this.factor, this.withEdges);
+    this.painter.draw(this.camera, this.factor, this.withEdges, this.glassy);
     this.triad();
   }
   triad() {
