@@ -8,21 +8,23 @@ import numpy as np
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
-from gibiane.values import ENTIER, FLOTTANT, MCHAML, MMODEL
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.estimate.contact import densities
 from gibiane_ops.kernels.estimate.residual import FACETS, INTERIOR, residuals
 from gibiane_ops.kernels.estimate.zz import SolidError, stress_energy
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.supports import moved
-from gibiane_ops.values.champs import MChaml
+from gibiane_ops.values.champs import ChPoint, MChaml
+from gibiane_ops.values.contact import zone_pairs
 from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
 from gibiane_ops.values.estimates import KIND, NORM, REFE, TABL, Guarantee, Parts, results, stresses_of
-from gibiane_ops.values.exterior import LOADS, exterior
+from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_compliance, on_zone, solid_zones
-from gibiane_ops.values.modele import Modele
+from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.pieces import cut_sides, exact_pieces, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
@@ -72,6 +74,31 @@ def _constitutive_relation(
     return results(ctx, parts_of(pieces, found), kind, norm, tabl, guarantee, refe, more)
 
 
+def _add_contact(ctx: Context, zones: list[ModelZone], sides: list[Side], contact: Modele, rea: ChPoint) -> None:
+    """Put the densities of contact forces among the tractions, opposite on the two surfaces."""
+    store, dim = node_store(ctx), zones[0].dim
+    for zone in contact.contacts:
+        pairs = zone_pairs(ctx, zone, "reaction")
+        if not pairs.plain.all():
+            ctx.fail(
+                251,
+                "contact residuals need surfaces whose nodes coincide; these have different meshes",
+                at="reaction",
+                hint="without 'REAC' the contact surfaces count as free of load",
+            )
+        slave, master = pairs.pairs.T
+        force = rea.table(FORCES[zones[0].family], slave)[:, :dim]
+        blocks = zone.slave.kernel_blocks
+        with worded(ctx, at="reaction"):
+            density = densities(store.coords[:, :dim], blocks, slave, force)
+        at_node, partner = np.zeros((store.count, dim)), np.full(store.count, -1, np.int64)
+        at_node[slave], partner[slave] = density, master
+        for name, cells in blocks:
+            add_tractions(sides, name, cells, at_node[cells])
+            both = (partner[cells] >= 0).all(axis=1)
+            add_tractions(sides, name, partner[cells[both]], -at_node[cells[both]])
+
+
 @ERRE.form(
     Key("RESI", "explicit residuals", required=True),
     Arg("model", MMODEL, "model"),
@@ -84,6 +111,13 @@ def _constitutive_relation(
         Arg("inside", FLOTTANT),
         Arg("across", FLOTTANT),
         name="constants",
+    ),
+    Key(
+        "REACTION",
+        "contact model and contact forces (REAC): the residual of the tractions on the contact surfaces (Wriggers)",
+        Arg("mc", MMODEL),
+        Arg("rea", CHPOINT),
+        name="reaction",
     ),
     KIND,
     TABL,
@@ -101,6 +135,7 @@ def _explicit_residuals(
     fsur: list[Any],
     volu: Point | None,
     constants: tuple[float, float] | None,
+    reaction: tuple[Modele, ChPoint] | None,
     kind: str | None,
     tabl: bool,
     refe: Any,
@@ -118,6 +153,8 @@ def _explicit_residuals(
         )
     inside, across = constants or (INTERIOR, FACETS)
     sides = exterior(ctx, zones, cl, pres, fsur)
+    if reaction is not None:
+        _add_contact(ctx, zones, sides, *reaction)
     dim = zones[0].dim
     blocks, moduli, laws = [], [], []
     for zone in zones:

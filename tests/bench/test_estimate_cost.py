@@ -87,7 +87,10 @@ def test_cost_against_effectivity(bench):
     rows = []
     for element, cut, n in (("CUB8", "", 10), ("TET4", CUT, 8)):
         session = session_of(CUBE.format(n=n, cut=cut))
-        solve = runs(session, "U = RESO ((RIGI MO MA) ET CL) (PRES 'MASS' MO 1. HAUT) ;")
+        # A new material, so that no factor is kept from before.
+        solve = runs(
+            session, "MA = MATE MO 'YOUN' 1. 'NU' 0.3 ; U = RESO ((RIGI MO MA) ET CL) (PRES 'MASS' MO 1. HAUT) ;"
+        )
         start = time.perf_counter()
         solve()
         solution = time.perf_counter() - start

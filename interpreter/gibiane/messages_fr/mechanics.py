@@ -178,6 +178,8 @@ MECHANICS = {
     "mesh the contact surface once and copy it for the other solid": "mailler une fois la surface de contact et la copier pour l'autre solide",
     "one solid holds materials {ratio} times stiffer than others: its smoothed stress runs across their jumps": "un même solide contient des matériaux {ratio} fois plus raides que d'autres : sa contrainte lissée passe à travers leurs sauts",
     "MODE for each material and their union by ET: solids are smoothed apart": "un MODE par matériau, réunis par ET : les solides sont lissés à part",
+    "contact residuals need surfaces whose nodes coincide; these have different meshes": "les résidus de contact demandent des surfaces à noeuds confondus ; celles-ci ont des maillages différents",
+    "without 'REAC' the contact surfaces count as free of load": "sans 'REAC' les surfaces de contact comptent comme libres de charge",
     "the estimate is not a bound: {reason}": "l'estimation n'est pas une borne : {reason}",
     "contact tractions in balance are built on facets of linear elements only, not on {shape}": "les vecteurs contrainte de contact en équilibre ne se construisent que sur des facettes d'éléments linéaires, non sur des {shape}",
     "{count} contact facets have no facet of a solid with the same nodes: tractions cannot be opposite there": "{count} facettes de contact n'ont pas de facette de solide aux mêmes noeuds : les vecteurs contrainte ne peuvent y être opposés",
