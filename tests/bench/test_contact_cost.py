@@ -120,3 +120,29 @@ def test_memory_of_a_whole_script(bench, sizes):
     bench.notes.append(
         f"contact, T1 {n}: peak of {float(done.stdout) / 1e3:.0f} Mbyte for the process (aim: below 2500 at 4)"
     )
+
+
+def energy(found):
+    """Return ``a(u, u)``: the work of the load less what friction dissipates."""
+    names = found.names()
+    nodes, forces = names["F"].parts["FZ"]
+    return float(forces @ names["U"].at("UZ", nodes)) - names["R"].get("DISSIPATION")
+
+
+@pytest.mark.bench
+@pytest.mark.skipif(
+    not os.environ.get("GIBIANE_BENCH_LARGE"), reason="GIBIANE_BENCH_LARGE=9: a million unknowns, 8 Gbyte"
+)
+def test_large_contact_by_multigrid(bench):
+    """Note the ratio to the bonded solution, the energy (10.13124962 at 9) and the peak of memory."""
+    import resource
+
+    n = int(os.environ["GIBIANE_BENCH_LARGE"])
+    option = "OPTI 'RESO' 'ITER' ;\n"
+    contact = session(option + text("T1", n) + CONTACT)
+    bonded = session(option + text("T1", n) + TIED)
+    one = {"bonded RESO": solving(bonded, "U = RESO KB FB ;")}
+    run = solving(contact, "R = TABL ; U = RESO KC FC 'RAPP' R ;")
+    bench.compare("contact, MU 0.2", f"T1 {n}, multigrid", run, one, aim=2.5, rounds=1)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    bench.notes.append(f"T1 {n}: energy {energy(contact):.8f}; both models and solvers took {peak:.2f} Gbyte at most")
