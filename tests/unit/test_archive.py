@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -128,3 +129,23 @@ def test_pickled_arrays_are_refused(saved):
     edited(saved, change)
     with pytest.raises(BadArchive):
         Archive(saved)
+
+
+def test_nodes_before_the_first_one_used_stay_behind(tmp_path: Path) -> None:
+    run, out, err = session()
+    script = (
+        "OPTI DIME 3 ELEM CUB8 ; A = (DROI 30 (0 0 0) (1 0 0)) TRAN 30 (0 1 0) ;"
+        "B = DROI 2 (0 0 7) (4 0 7) ; L = PROG 1. 2. ;"
+        f"OPTI SAUV '{tmp_path / 'line'}' ; SAUV B L ; OPTI SAUV '{tmp_path / 'list'}' ; SAUV L ;"
+        f"OPTI REST '{tmp_path / 'line'}' ; REST ; MESS (MESU B) ' ' (COOR 3 (B POIN 3)) ;"
+    )
+    assert run.run_text(script) == 0, err.getvalue()
+    assert out.getvalue().split()[-2:] == ["4.00000E+00", "7.00000E+00"]
+    assert len(node_arrays(tmp_path / "line.gibi.zip")) == 3
+    assert len(node_arrays(tmp_path / "list.gibi.zip")) == 0
+
+
+def node_arrays(path: Path) -> np.ndarray:
+    with zipfile.ZipFile(path) as archive:
+        number = json.loads(archive.read("session.json"))["nodes"][0]["array"]
+        return np.load(io.BytesIO(archive.read(f"arrays/{number}.npy")), allow_pickle=False)

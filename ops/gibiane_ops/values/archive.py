@@ -64,6 +64,7 @@ class _Writer:
         self.store = store
         self.objects: list[Any] = []
         self.arrays: list[Any] = []
+        self.first = store.count  # no object has a node before this one
         self._known: dict[int, int] = {}
         self._alive: list[Any] = []
 
@@ -117,7 +118,18 @@ class _Writer:
         if isinstance(value, ChPoint | Maillage):
             _ = value.parts if isinstance(value, ChPoint) else value.blocks  # merged nodes are replaced
         state = {name: self.encode(attribute) for name, attribute in _attributes(value).items()}
+        self._note_nodes(value)
         return {"class": f"{kind.__module__}:{kind.__qualname__}", "state": state}
+
+    def _note_nodes(self, value: Any) -> None:
+        """Keep the lowest node that an object holds."""
+        held: list[Any] = [getattr(value, name, None) for name in NODES.get(type(value).__name__, ())]
+        if isinstance(value, ChPoint):
+            held.extend(nodes for nodes, _ in value.parts.values())
+        for nodes in held:
+            if isinstance(nodes, int | np.ndarray):
+                found = np.asarray(nodes)
+                self.first = min(self.first, int(found[found >= 0].min(initial=self.first)))
 
 
 def _attributes(value: Any) -> dict[str, Any]:
@@ -139,11 +151,15 @@ def write_archive(
     """
     writer = _Writer(store)
     named = [[name, writer.encode(value)] for name, value in names.items()]
-    nodes = [store.coords, store.density, store.canonical(np.arange(store.count))]
+    first = writer.first
+    own = np.arange(store.count - first)
+    alias = store.canonical(np.arange(first, store.count)) - first
+    nodes = [store.coords[first:], store.density[first:], np.where(alias < 0, own, alias)]
     content = {
         "format": FORMAT,
         "label": label,
         "options": dict(options),
+        "first": first,
         "nodes": [writer.encode(a) for a in nodes],
         "names": named,
         "objects": writer.objects,
@@ -216,13 +232,14 @@ class Archive:
             When the content is not what this package writes.
         """
         try:
-            reader = _Reader(self._content["objects"], self._arrays, store, store.count, rebuild)
+            offset = store.count - int(self._content.get("first", 0))
+            reader = _Reader(self._content["objects"], self._arrays, store, offset, rebuild)
             coords, density, alias = (np.asarray(reader.decode(a)) for a in self._content["nodes"])
-            offset = store.count
+            start = store.count
             store.add(coords.reshape(-1, 3), density)
             moved = np.flatnonzero(alias != np.arange(len(alias)))
             if len(moved):
-                store.merge(alias[moved] + offset, moved + offset)
+                store.merge(alias[moved] + start, moved + start)
             found = {name: reader.decode(value) for name, value in self._content["names"]}
         except (ValueError, KeyError, TypeError, IndexError, AttributeError, ImportError) as failure:
             raise BadArchive(f"its content is damaged ({type(failure).__name__})") from failure
