@@ -1,0 +1,43 @@
+"""The report of examples/these, made by its script and read in a real browser."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from browser import Browser, find_browser
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_browser() is None, reason="SKIPPED LOUDLY: no Chromium, the report is not looked at")
+def test_the_short_report_of_the_thesis(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "examples" / "these" / "rapport.dgibi", tmp_path)
+    paths = os.pathsep.join(str(ROOT / folder) for folder in ("interpreter", "ops"))
+    run = subprocess.run(
+        [sys.executable, "-m", "gibiane", "rapport.dgibi"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        timeout=1200,
+    )
+    assert "the report: results/rapport.html" in run.stdout, run.stderr
+    file = tmp_path / "results" / "rapport.html"
+    assert not re.search(r"https?://(?!www\.w3\.org)", file.read_text(encoding="utf-8"))
+    browser = Browser(tmp_path / "profile")
+    try:
+        browser.open(file, "location.pathname.endsWith('rapport.html') && gibiane.data !== null")
+        pages = browser.value("gibiane.data.pages.length")
+        assert pages == 15
+        for page in range(pages):
+            browser.value(f"gibiane.open({page})")
+        browser.wait("Object.keys(gibiane.views).length >= 6")
+        assert browser.value("gibiane.errors.length") == 0
+        assert browser.complaints == []
+    finally:
+        browser.close()
