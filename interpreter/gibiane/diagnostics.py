@@ -25,6 +25,7 @@ LEVELS: dict[str, int] = {
     "G415": WARNING,
     "G416": WARNING,
     "G417": WARNING,
+    "G418": NOTE,
     "G900": FATAL,
 }
 G_CODES = {
@@ -51,6 +52,7 @@ G_CODES = {
     "G415": "solution of an ill-conditioned system",
     "G416": "result of an approximate contact law",
     "G417": "slips beyond the facets of the start",
+    "G418": "contact stopped early because the user asked for it",
     "G501": "file cut or of unknown format",
     "G601": "workers of a study are lost",
     "G602": "no cluster answers",

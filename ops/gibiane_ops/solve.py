@@ -37,6 +37,9 @@ RESO = operator(
     "contact, which 3 to 6 solutions of the tied solids correct to 1.E-9 of the largest force; PENA, PERT, STATUT, "
     "'UNIQ' and 'NCON' take one solution per contact unknown instead), and r is a multiple of its stiffness, so that "
     "no result depends on units. 'NEWT' (default): exact, 1 to 10 dense factorisations; falls back on damped steps; "
+    "'KRYL' is the same without condensation, whatever the size: conjugate gradients with multigrid on the tied solids "
+    "correct a small model, as they do unasked for a large solid that a factor would not fit (OPTI 'ECHO' 1 tells the "
+    "way chosen). "
     "above MU about 1 one of several solutions ('UNIQ' looks for others). 'TRES': friction bound frozen, solved, "
     "updated; same solution, 4 to 20 times the cost; does not contract for large MU. 'MULT': multipliers and active "
     "set; same solution; no safeguard, statuses may cycle (G406). 'PENA' r: springs; the error is about 1/r (r = 1E4 "
@@ -52,14 +55,21 @@ RESO = operator(
     "no node inside the cone and keeps an error of its own. Sn is the penetration from which a node closes; with St "
     "above 0 nodes inside the cone are held, and a sliding node sticks again when its slip is below St: this cycles "
     "when St is of the order of the slip. 'TOLE' x and 'ITMA' n change the tolerance (relative residual) and the "
-    "largest number of iterations; a result that breaks the exact laws by more than 1.E-5 (a hundred times TOLE if "
+    "largest number of iterations; 'ARRE' e, e the error of the mesh in energy norm "
+    "(absolute, the third result of ERRE or 'ABSOLUE' of its TABLE), "
+    "stops the corrections of a small model when SOLVEUR is below a tenth of it (CONVERGE is FAUX then, without "
+    "failure; MESSAGE or a note says it); on a condensed interface, where an iteration costs a thousandth of the "
+    "preparation, nothing would be saved and nothing changes; "
+    "a result that breaks the exact laws by more than 1.E-5 (a hundred times TOLE if "
     "larger) is never called converged, but for PENA, PERT and STATUT, which obey laws of their own. 'HIST' U0: slip "
     "counts from the solution U0 of the load step before. 'DEPA' U1: start of the iterations. 'RAPP' T fills a table: "
     "CONVERGE, METHODE, ITERATIONS, STATUTS (open, stick, slip), PENETRATION and GLISSEMENT (slip of a node inside "
     "the cone), over the natural length of the interface, CONE (force outside the cone over the largest bound), "
     "PUISSANCE (friction that does not oppose slip, force on an open node, over the energy), EQUILIBRE, EXACT (VRAI "
     "when all of them are below 1.E-5), ECART for PENA, PERT and STATUT (differences of displacement and of force "
-    "from 'NEWT', relative), DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE and AUTRES (statuses "
+    "from 'NEWT', relative), SOLVEUR (estimate of what the iterations, or an approximate law, have left: the energy "
+    "norm of the difference from the exact solution on this mesh, by Newton steps from the result, in the unit of "
+    "'ABSOLUE' of ERRE), DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE and AUTRES (statuses "
     "of the other solutions) with 'UNIQ', CONDITION with 'NCON' (of the matrix of the method: whole model for PENA "
     "and UZAW, interface for the others), HISTOIRE (RESIDU, CHANGEMENTS of status), MESSAGE. 'SOUC' turns a failure "
     "to converge into a warning and gives the best iterate; with 'RAPP' the table says it (CONVERGE, MESSAGE) in "
@@ -95,6 +105,7 @@ RESO = operator(
     Key("DEPA", "start of the contact iterations", Arg("u1", CHPOINT)),
     Key("TOLE", "tolerance of the contact iterations", Arg("x", FLOTTANT)),
     Key("ITMA", "largest number of contact iterations", Arg("n", ENTIER)),
+    Key("ARRE", "error of the mesh, energy norm: corrections of a small model stop at a tenth", Arg("e", FLOTTANT)),
     Key("UNIQ", "look for other solutions"),
     Key("NCON", "condition number of the matrix of the method"),
     Key("SOUC", "unconverged contact is a warning"),
@@ -115,6 +126,7 @@ def _reso(
     depa: ChPoint | None,
     tole: float | None,
     itma: int | None,
+    arre: float | None,
     uniq: bool,
     ncon: bool,
     souc: bool,
@@ -122,7 +134,15 @@ def _reso(
     noid: bool,
 ) -> Any:
     chosen = _method(ctx, method, with_r, statuses, tole, itma)
-    wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq, ncon)
+    if arre is not None and not 0 < arre < np.inf:
+        ctx.fail(
+            41,
+            "ARRE = {value}: the error of the mesh is positive",
+            at="arre",
+            value=float(arre),
+            hint="'ABSOLUE' of the TABLE of ERRE is one; without ARRE the iterations go to the end",
+        )
+    wishes = Wishes(chosen, rapp, hist, depa, souc, noun, uniq, ncon, float(arre or 0.0))
     return tuple(_solutions(ctx, k, f, prec, noid, wishes))
 
 

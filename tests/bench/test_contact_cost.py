@@ -11,6 +11,12 @@ from pathlib import Path
 import pytest
 
 from gibiane.session import Session
+from gibiane_ops.kernels.contact.condense import condense
+from gibiane_ops.kernels.contact.law import friction
+from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.problem import Problem
+from gibiane_ops.kernels.contact.solver_error import solver_error
+from gibiane_ops.kernels.solve import factorize
 
 HERE = Path(__file__).parent
 SIDES = {"T1": 50.0, "T2": 100.0, "T4": 200.0}
@@ -120,6 +126,33 @@ def test_memory_of_a_whole_script(bench, sizes):
     bench.notes.append(
         f"contact, T1 {n}: peak of {float(done.stdout) / 1e3:.0f} Mbyte for the process (aim: below 2500 at 4)"
     )
+
+
+@pytest.mark.bench
+def test_an_iteration_against_its_factorisation(bench, sizes):
+    """Say why condensed contact does not stop early: one Newton step of the interface, and the tied factorisation."""
+    sys.path.insert(0, str(HERE.parent / "scenes"))
+    from two_blocks import blocks
+
+    for n in sizes:
+        scene = blocks(f"T1_{n}")
+        interface = scene.interface
+        law = friction(interface.n_pairs, mu=0.2)
+        problem = Problem.of(interface, law, 1.0)
+        state = solve_coulomb(interface, law)
+        w, r = state.w / problem.length, state.r / problem.force
+        peers = {
+            "factorisation": lambda scene=scene: factorize(scene.tied.tied.A),
+            "factorisation and Schur complement": lambda scene=scene: condense(
+                scene.K, scene.pairs, scene.reduction, points=scene.points
+            ).exact(),
+        }
+        step = lambda problem=problem, w=w, r=r: problem.step(w, r)  # noqa: E731
+        bench.compare("one iteration on the condensed interface", f"T1 {n}", step, peers, rounds=5)
+        share = bench.rows[-2]["ours"] / bench.rows[-2]["peer_time"]
+        bench.notes.append(f"T1 {n}: one contact iteration costs {share:.3%} of the factorisation of the tied solids")
+        estimate = lambda interface=interface, state=state: solver_error(interface, state)  # noqa: E731
+        bench.compare("estimate of the solver error", f"T1 {n}", estimate, peers, rounds=5)
 
 
 def energy(found):

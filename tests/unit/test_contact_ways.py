@@ -83,3 +83,65 @@ def test_an_interruption_keeps_the_session(session, corrected, monkeypatch):
     first, _ = solve(session)
     again, _ = solve(session)
     np.testing.assert_array_equal(first["UX"], again["UX"])
+
+
+def energy_of(difference, session):
+    """Return the square root of ``du . K du`` of a difference of solutions named by an expression."""
+    script = f"D = {difference} ; Q = K * (ENLE D 'LX') ;"
+    assert session.run_text(script) == 0, session.err.getvalue()
+    names = session.names()
+    parts = names["D"].parts
+    force = names["Q"].parts
+    total = 0.0
+    for axis in "XYZ":
+        nodes, values = parts[f"U{axis}"]
+        total += float(values @ names["Q"].at(f"F{axis}", nodes)) if f"F{axis}" in force else 0.0
+    return np.sqrt(max(total, 0.0))
+
+
+@pytest.mark.parametrize("solver", ["DIRE", "ITER"])
+def test_corrections_stop_at_a_tenth_of_the_error_of_the_mesh(session, corrected, solver):
+    option = f"OPTI 'RESO' '{solver}' ;"
+    _, whole = solve(session, option)
+    assert session.run_text("U0 = U ;") == 0
+    assert whole.get("CONVERGE") is True
+    size = energy_of("U0", session)
+    assert whole.get("SOLVEUR") < 1e-7 * size
+    stopped = 0
+    for share in (3.0, 0.3, 0.03, 3e-3):
+        aim = share * size
+        _, table = solve(session, option, f"'ARRE' {aim:.15E}")
+        true, estimate = energy_of("U - U0", session), table.get("SOLVEUR")
+        assert estimate < 0.1 * aim
+        assert true / 3 <= estimate <= 3 * true or true < 1e-8 * size
+        if not table.get("CONVERGE"):
+            stopped += 1
+            assert "ARRE" in table.get("MESSAGE")
+    assert stopped >= 2
+
+
+def test_early_stop_without_report_is_noted(session, corrected):
+    assert session.run_text("U = RESO (K ET CL ET RC) (F ET JC) 'ARRE' 1.E3 ;") == 0
+    assert "G418" in session.err.getvalue() + session.out.getvalue()
+
+
+def test_condensed_contact_does_not_stop_early(session):
+    exact, table = solve(session)
+    found, other = solve(session, words="'ARRE' 1.E3")
+    assert other.get("CONVERGE") is True
+    assert other.get("SOLVEUR") == table.get("SOLVEUR")
+    for name, values in exact.items():
+        np.testing.assert_array_equal(found[name], values)
+
+
+def test_krylov_equals_newton(session):
+    exact, table = solve(session)
+    found, other = solve(session, words="'KRYL'")
+    bodies = contact_of(session)
+    assert bodies.factor.name == "amg"
+    assert not bodies.is_exact
+    assert bodies.learned is not None
+    for name, values in exact.items():
+        np.testing.assert_allclose(found[name], values, atol=1e-8 * np.abs(values).max())
+    assert other.get("METHODE") == "KRYL"
+    assert list(other.get("STATUTS").values) == list(table.get("STATUTS").values)

@@ -37,13 +37,23 @@ class Prepared:
     way: Plan
 
 
-def way_of(ctx: Context, system: System, pairs: ContactPairs, reduction: Reduction, exact: bool) -> Plan:
+def way_of(ctx: Context, system: System, pairs: ContactPairs, reduction: Reduction, exact: bool, krylov: bool) -> Plan:
     """Choose the way and, with ECHO, say it in one line."""
     dim = system.dim
     elastic = system.names in ELASTIC and not len(system.stop_signs)
+    if krylov and not elastic:
+        ctx.fail(
+            21,
+            "'KRYL' needs elastic solids and conditions without MINI or MAXI",
+            at="k",
+            hint="the default method 'NEWT' treats them",
+        )
     n = len(reduction.free) - len(pairs.pairs) * dim * bool((pairs.pairs >= 0).all())
     components = (len(pairs.pairs) + len(system.stop_signs)) * dim
-    chosen = plan(n, system.K.nnz, components, dim, wish=solver_wish(ctx), coordinates=elastic, all_exact=exact)
+    chosen = plan(
+        n, system.K.nnz, components, dim,
+        wish=solver_wish(ctx), coordinates=elastic, all_exact=exact, krylov=krylov,
+    )  # fmt: skip
     if ctx.option("ECHO") >= 1:
         how = "condensed on" if chosen.exact else "corrected on a small model of"
         solver = METHODS.get(chosen.method, "a factor")
@@ -65,6 +75,7 @@ def run_on_bodies(
     method: Method,
     *,
     exact: bool,
+    enough: float,
     start: ContactState | None,
     slip_origin: FloatArray | None,
 ) -> Corrected:
@@ -74,11 +85,13 @@ def run_on_bodies(
     ----------
     exact : bool
         Whether the exact stiffness is needed whatever the plan.
+    enough : float
+        Energy norm of the rest at which corrections may stop; 0 never.
     """
     echo = ctx.option("ECHO") >= 1
     progress = _Progress(echo)
     options: dict[str, Any] = {"start": start, "slip_origin": slip_origin}
-    plain = method.name == "NEWT" and start is None
+    plain = method.is_newton and start is None
 
     def again(interface: Interface, before: ContactState) -> ContactState:
         return method.solve(interface, law, start=before, slip_origin=slip_origin)
@@ -91,11 +104,13 @@ def run_on_bodies(
     found = solve_on_bodies(
         prepared.bodies, load, gap, law,
         lambda interface: method.solve(interface, law, **options),
-        newton=None if method.name == "NEWT" else lambda interface: method.solve_exact(interface, law, slip_origin),
-        again=again if method.name == "NEWT" else None, exact=exact or prepared.way.exact,
-        tied_first=plain, slip_origin=slip_origin, tell=progress.tell, say=say,
+        newton=None if method.is_newton else lambda interface: method.solve_exact(interface, law, slip_origin),
+        again=again if method.is_newton else None, exact=exact or prepared.way.exact,
+        tied_first=plain, slip_origin=slip_origin, enough=enough, tell=progress.tell, say=say,
     )  # fmt: skip
     progress.clear()
+    if echo and enough and found.exact:
+        say("contact is condensed, where iterations cost next to nothing: 'ARRE' changes nothing")
     if echo and not found.exact:
         say("the tied solids are the solution" if not found.corrections else f"{found.corrections} corrections")
     return found

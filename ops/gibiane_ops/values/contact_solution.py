@@ -30,13 +30,26 @@ from gibiane_ops.values.failures import worded
 from gibiane_ops.values.linear import solver_wish
 from gibiane_ops.values.methods import Method
 from gibiane_ops.values.nodes import FloatArray, IntArray
-from gibiane_ops.values.rapport import TOLD, counted, departures, fill_report, success, tell_distance, tell_others
+from gibiane_ops.values.rapport import (
+    TOLD,
+    counted,
+    departures,
+    fill_report,
+    stopped,
+    success,
+    tell_distance,
+    tell_others,
+    tell_solver_error,
+)
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.solving import ELASTIC, check_held, kept, tell_notes
 from gibiane_ops.values.system import System
 
 FAR = 0.5
 """Slip over the size of the facets above which the pairs of the start are doubtful."""
+
+ENOUGH = 0.1
+"""Share of the error of the mesh at which the solver may stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +71,8 @@ class Wishes:
         Look for other solutions.
     conditioning : bool
         Measure the matrix of the method.
+    mesh_error : float
+        Energy norm of the error of the mesh, beside which that of the solver need not be seen; 0 when not given.
     """
 
     method: Method
@@ -68,6 +83,7 @@ class Wishes:
     bonded: bool
     compare: bool
     conditioning: bool
+    mesh_error: float = 0.0
 
 
 def solve_contact(
@@ -103,7 +119,7 @@ def solve_contact(
     def prepare() -> Prepared:
         check_held(ctx, system, _held_rows(system, pairs))
         try:
-            way = way_of(ctx, system, pairs, reduction, exact)
+            way = way_of(ctx, system, pairs, reduction, exact, wishes.method.krylov)
             points = system.points if system.names in ELASTIC else None
             bodies = condense(system.K, pairs, reduction, stops=system.stops, points=points, method=way.method)
             return Prepared(bodies, way)
@@ -126,7 +142,7 @@ def solve_contact(
 
     with worded(ctx, at="k"):
         geometry = (pairs.pairs, pairs.normals, pairs.row, pairs.node, pairs.coefficient)
-        key = solver_wish(ctx), *(each.tobytes() for each in geometry)
+        key = solver_wish(ctx), wishes.method.krylov, *(each.tobytes() for each in geometry)
         prepared: Prepared = kept(ctx, "contact", k, key, prepare)
         bodies = prepared.bodies
         tied = bodies.load(F, reduction.offset)
@@ -223,9 +239,14 @@ def _run(
         else:
             with worded(ctx, at="k"):
                 found = run_on_bodies(
-                    ctx, prepared, tied, gap, law, method, exact=exact, start=start, slip_origin=origin
-                )
+                    ctx, prepared, tied, gap, law, method, exact=exact,
+                    enough=ENOUGH * wishes.mesh_error, start=start, slip_origin=origin,
+                )  # fmt: skip
         message = success(method, found.state)
+        if found.left:
+            converged, message = False, stopped(found.left, ENOUGH * wishes.mesh_error)
+            if wishes.report is None:
+                ctx.warn("G418", "contact {reason}", level=0, reason=message)
     except (k_errors.NotConverged, k_errors.StatusCycle, k_errors.ContactUnbalanced) as failure:
         best = failure.best
         if not isinstance(best, ContactState):
@@ -241,6 +262,8 @@ def _run(
     interface, state = found.interface, found.state
     if wishes.report is not None:
         _report(wishes.report, system, method, interface, state, converged, message)
+        if not wishes.bonded:
+            tell_solver_error(wishes.report, found, origin)
         if method.approximate and not wishes.bonded:
             tell_distance(wishes.report, method, interface, state, origin)
     elif converged and method.approximate and state.report.worst > TOLD:
@@ -252,7 +275,7 @@ def _run(
             reason=departures(state),
             hint="'RAPP' T gives the distance; 'NEWT' is exact, a penalty is nearer with a larger r",
         )
-    if converged and not method.approximate:
+    if (converged or found.left) and not method.approximate:
         _warn_far(ctx, system, pairs, state)
     if wishes.compare and converged:
         # an approximate method may be far from every solution: the exact one is what is unique or not
@@ -472,7 +495,7 @@ def _fail(ctx: Context, failure: Any, reason: str, method: Method) -> NoReturn:
         method=method.title,
         reason=reason,
         hint="'RAPP' T keeps the history, 'SOUC' gives the best iterate"
-        if method.name == "NEWT"
+        if method.is_newton
         else "the default method 'NEWT' needs no parameter; 'RAPP' T keeps the history, "
         "'ITMA' n allows more iterations",
     )

@@ -25,6 +25,7 @@ from gibiane_ops.values.nodes import FloatArray
 # keyword and what it is; those of WITH_R take a number r, a multiple of the stiffness of the interface
 PLAIN = {
     "NEWT": "exact, semi-smooth Newton",
+    "KRYL": "the same without condensation, by iterations",
     "TRES": "sequence of Tresca problems",
     "MULT": "multipliers and active set",
     "PROJ": "projected Gauss-Seidel",
@@ -47,6 +48,7 @@ _MATRICES = {
 
 _SOLVERS: dict[str, Callable[..., ContactState]] = {
     "NEWT": solve_coulomb,
+    "KRYL": solve_coulomb,
     "TRES": solve_tresca_sequence,
     "MULT": solve_multipliers,
     "PROJ": solve_gauss_seidel,
@@ -86,6 +88,16 @@ class Method:
     def title(self) -> str:
         """The keyword with its number."""
         return self.name if self.r is None else f"{self.name} {self.r:g}"
+
+    @property
+    def krylov(self) -> bool:
+        """Whether the interface must not be condensed."""
+        return self.name == "KRYL"
+
+    @property
+    def is_newton(self) -> bool:
+        """Whether it is the exact semi-smooth Newton method."""
+        return self.name in ("NEWT", "KRYL")
 
     @property
     def approximate(self) -> bool:

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.sparse as sp
 
 from gibiane.values import Table
+from gibiane_ops.kernels.contact.correction import Corrected
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.outcome import DEPARTURE
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState
+from gibiane_ops.kernels.contact.solver_error import solver_error
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
 from gibiane_ops.values.listes import ListEnti, ListReel
 from gibiane_ops.values.methods import OWN_LAW, Method
@@ -33,7 +36,7 @@ def fill_report(
     `zones` holds the number of pairs of each zone, in order; stops come after them.
     """
     report = state.report
-    for index in ("ECART", "UNIQUE", "AUTRES", "CONDITION"):
+    for index in ("ECART", "SOLVEUR", "UNIQUE", "AUTRES", "CONDITION"):
         if table.has(index):
             table.remove(index)
     history = Table()
@@ -68,6 +71,11 @@ def success(method: Method, state: ContactState) -> str:
     return "converged"
 
 
+def stopped(left: float, enough: float) -> str:
+    """Say that the corrections of a contact solution stopped early because the user asked for it."""
+    return f"stopped early by 'ARRE': the error left is about {left:.2g}, below {enough:.2g} (energy norm)"
+
+
 def departures(state: ContactState) -> str:
     """Word the departures of a state from the exact laws."""
     report = state.report
@@ -93,6 +101,14 @@ def tell_others(table: Table, others: Sequence[ContactState]) -> None:
         report = state.report
         found.set(number, ListEnti([report.n_open, report.n_stick, report.n_slip]))
     table.set("AUTRES", found)
+
+
+def tell_solver_error(table: Table, found: Corrected, slip_origin: FloatArray | None) -> None:
+    """Put the energy norm of what the iterations have left into a report, as SOLVEUR; absent when it is unknown."""
+    # the tied bodies are the solution itself, and no stiffness was needed to know it
+    error = 0.0 if sp.issparse(found.interface.S) else solver_error(found.interface, found.state, slip_origin)
+    if error is not None:
+        table.set("SOLVEUR", error)
 
 
 def tell_distance(

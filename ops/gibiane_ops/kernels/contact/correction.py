@@ -13,6 +13,7 @@ from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import solve_tied
 from gibiane_ops.kernels.contact.report import ContactState
+from gibiane_ops.kernels.contact.solver_error import solver_error
 from gibiane_ops.kernels.contact.tied import PASSES
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged, StatusCycle
 
@@ -46,6 +47,8 @@ class Corrected:
     corrections : int
         Solutions with the tied matrix beyond that of the load; 0 when the tied bodies were the solution.
     exact : bool
+    left : float
+        Estimate of the energy norm of what was left when the corrections stopped early; 0 when they did not.
     """
 
     state: ContactState
@@ -53,6 +56,7 @@ class Corrected:
     displacement: FloatArray
     corrections: int
     exact: bool
+    left: float = 0.0
 
 
 class Stalled(Exception):
@@ -105,6 +109,8 @@ def solve_corrected(
     run: Run,
     *,
     again: Again | None = None,
+    enough: float = 0.0,
+    slip_origin: FloatArray | None = None,
     tell: Callable[[int, float], None] | None = None,
 ) -> Corrected:
     """Solve contact on the small model, correct its forces by a solution with the tied matrix, and again.
@@ -119,13 +125,17 @@ def solve_corrected(
         Any method: from an interface to a state; each pass runs it anew.
     again : callable, optional
         The method from the state before, for the passes after the first; their steps are added to its history.
+    enough : float
+        Estimate of ``solver_error`` below which the corrections stop early; 0 never.
+    slip_origin : (n, d - 1) float64, optional
+        For that estimate.
     tell : callable, optional
         Called with the number of the correction and the relative difference of the forces.
 
     Returns
     -------
     Corrected
-        Its forces are within ``AGREEMENT`` of equilibrium with the bodies themselves.
+        Its forces are within ``AGREEMENT`` of equilibrium with the bodies themselves, unless ``left`` says otherwise.
 
     Raises
     ------
@@ -152,10 +162,9 @@ def solve_corrected(
     w, x, y = np.zeros(size), np.zeros(len(load.x)), np.zeros(size)
     differences: list[float] = []
     before: ContactState | None = None
+    left = 0.0
+    interface = _around(bodies, load, gap, w, y)
     while True:
-        learned = bodies.learned
-        f = load.f if bodies.tied.direct else learned.still(learned.S @ w - y) + load.f
-        interface = replace(bodies.interface_of(load, learned, gap), f=f)
         if again is None or before is None:
             state = run(interface)
         else:
@@ -164,7 +173,7 @@ def solve_corrected(
         before = state
         new_w = state.w.ravel()
         x, y_new = _true_force(bodies, new_w, w, x, y)
-        bodies.learned = learned.learned(new_w - w, y_new - y)
+        bodies.learned = bodies.learned.learned(new_w - w, y_new - y)
         true = y_new - load.f
         scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
         active = bodies.active.ravel()
@@ -172,8 +181,14 @@ def solve_corrected(
         w, y = new_w, y_new
         if tell is not None:
             tell(len(differences), differences[-1])
+        interface = _around(bodies, load, gap, w, y)
         if differences[-1] <= AGREEMENT:
             break
+        if enough:
+            error = solver_error(interface, state, slip_origin)
+            if error is not None and error < enough:
+                left = error
+                break
         recent = differences[-PATIENCE:]
         if len(differences) >= MOST or (
             len(differences) > PATIENCE and min(recent) > 0.5 * min(differences[:-PATIENCE])
@@ -183,7 +198,7 @@ def solve_corrected(
     report = replace(state.report, balance=max(state.report.balance, differences[-1]))
     displacement = bodies.displacement(load, w, x)
     bodies.remember(w, x)
-    return Corrected(replace(state, report=report), interface, displacement, len(differences), False)
+    return Corrected(replace(state, report=report), interface, displacement, len(differences), False, left)
 
 
 def solve_stuck(bodies: Condensation, load: TiedSolution, gap: FloatArray) -> Corrected:
@@ -203,6 +218,14 @@ def solve_stuck(bodies: Condensation, load: TiedSolution, gap: FloatArray) -> Co
     zero = np.zeros(len(load.f))
     displacement = bodies.displacement(load, zero, np.zeros(len(load.x)))
     return Corrected(solve_tied(interface), interface, displacement, 0, False)
+
+
+def _around(bodies: Condensation, load: TiedSolution, gap: FloatArray, w: FloatArray, y: FloatArray) -> Interface:
+    """Put together the interface whose force on w is the true one, ``y - f``."""
+    learned = bodies.learned
+    assert learned is not None
+    f = load.f if bodies.tied.direct else learned.still(learned.S @ w - y) + load.f
+    return replace(bodies.interface_of(load, learned, gap), f=f)
 
 
 def _true_force(

@@ -68,6 +68,7 @@ def plan(
     wish: str = "",
     coordinates: bool = True,
     all_exact: bool = False,
+    krylov: bool = False,
 ) -> Plan:
     """Choose the solver of the tied bodies and the way to the stiffness of the pairs.
 
@@ -84,13 +85,17 @@ def plan(
         Whether the small model can be built.
     all_exact : bool
         Whether the method needs the exact stiffness.
+    krylov : bool
+        Iterations without condensation, whatever the size; the small model can be built.
 
     Returns
     -------
     Plan
     """
-    exact = all_exact or not coordinates or n <= SMALL or components <= FEW or dim == 2
-    choice = choose(n, entries, dim, components if exact else PASSES, wish=wish, elastic=coordinates and dim == 3)
+    small = n <= SMALL or components <= FEW or dim == 2
+    exact = all_exact or not coordinates or (small and not krylov)
+    wish, fits = ("ITER", True) if krylov else (wish, coordinates and dim == 3)
+    choice = choose(n, entries, dim, components if exact else PASSES, wish=wish, elastic=fits)
     direct = choice.direct
     if not direct and not coordinates:
         choice, direct = Choice("auto", direct_memory(n, dim), True), True
@@ -113,6 +118,7 @@ def solve_on_bodies(
     exact: bool,
     tied_first: bool,
     slip_origin: FloatArray | None = None,
+    enough: float = 0.0,
     tell: Callable[[int, float], None] | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Corrected:
@@ -135,6 +141,8 @@ def solve_on_bodies(
     tied_first : bool
         Whether the state of tied bodies may be the answer, without any model.
     slip_origin : (n, d - 1) float64, optional
+    enough : float
+        See ``solve_corrected``; of no effect on the exact stiffness.
     tell : callable, optional
         See ``solve_corrected``.
     say : callable
@@ -155,8 +163,10 @@ def solve_on_bodies(
             return solve_stuck(bodies, load, gap)
         try:
             if newton is not None:
-                solve_corrected(bodies, load, gap, newton, tell=tell)
-            return solve_corrected(bodies, load, gap, run, again=again, tell=tell)
+                solve_corrected(bodies, load, gap, newton, enough=enough, slip_origin=slip_origin, tell=tell)
+            return solve_corrected(
+                bodies, load, gap, run, again=again, enough=enough, slip_origin=slip_origin, tell=tell
+            )
         except (Stalled, *Failure) as failure:
             seconds = bodies.n_components * bodies.tied.seconds / (8 if bodies.tied.direct else 1)
             way = f"{bodies.n_components} back substitutions, about {seconds:.0f} s"
