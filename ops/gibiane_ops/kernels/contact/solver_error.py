@@ -62,7 +62,7 @@ def solver_error(interface: Interface, state: ContactState, slip_origin: FloatAr
         except np.linalg.LinAlgError:
             break
         w, r = w + dw, r + dr
-        far, moved = (float(max(x.ravel() @ problem.S @ x.ravel(), 0.0)) ** 0.5 for x in (w - start, dw))
+        far, moved = (max(float(x.ravel() @ problem.S @ x.ravel()), 0.0) ** 0.5 for x in (w - start, dw))
         merit = problem.merit(w, r)
         if merit < least:
             least, found = merit, far
