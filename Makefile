@@ -40,8 +40,9 @@ demo: venv
 	@echo "Pictures and files of this run: $(DEMO)/results"
 	@ls $(DEMO)/results
 
+# One process a core, one thread each: small dense systems run many times slower on two busy threads.
 test: venv
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto
 
 check: venv-dev
 	$(BIN)/ruff format --check .
