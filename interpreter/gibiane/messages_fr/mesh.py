@@ -203,6 +203,8 @@ MESH = {
     "no curve to draw": "pas de courbe à dessiner",
     "curve {number} has a list of words: it cannot be drawn": "la courbe {number} a une liste de mots : elle ne se dessine pas",
     "the field has no displacement; it has {known}": "le champ n'a pas de déplacement ; il a {known}",
+    "the field moves nodes by UZ, out of the plane of OPTI DIME 2": "le champ déplace des nœuds selon UZ, hors du plan de OPTI DIME 2",
+    "EXCO keeps the components wanted: EXCO (MOTS 'UX' 'UY') CH (MOTS 'UX' 'UY')": "EXCO garde les composantes voulues : EXCO (MOTS 'UX' 'UY') CH (MOTS 'UX' 'UY')",
     "arrows of an element field are not available yet": "les flèches d'un champ par éléments ne sont pas encore disponibles",
     "CHAN 'CHPO' makes a nodal field of it": "CHAN 'CHPO' en fait un champ par points",
     "the picture {path} cannot be written ({reason})": "l'image {path} ne peut pas être écrite ({reason})",

@@ -65,9 +65,18 @@ def shift(ctx: Context, by: Any, sign: float, at: str = "objects") -> Callable[[
             hint="the last operand is the vector: G PLUS (0. 0. 1.)",
         )
     # UZ is a name of two families, hence the largest number of names in common.
-    names = max(DISPLACEMENTS.values(), key=lambda family: len(set(family) & set(by.names)))
+    # On a tie the family of the mode wins: UZ alone is the second coordinate in AXIS.
+    here = DISPLACEMENTS.get(str(ctx.option("MODE"))[:4])
+    names = max(DISPLACEMENTS.values(), key=lambda family: (len(set(family) & set(by.names)), family == here))
     if not set(names) & set(by.names):
         ctx.fail(181, "the field has no displacement; it has {known}", at=at, known=" ".join(by.names) or "none")
+    if len(names) == 3 and dimension(ctx) == 2 and "UZ" in by.names and np.any(by.parts["UZ"][1]):
+        ctx.fail(
+            34,
+            "the field moves nodes by UZ, out of the plane of OPTI DIME 2",
+            at=at,
+            hint="EXCO keeps the components wanted: EXCO (MOTS 'UX' 'UY') CH (MOTS 'UX' 'UY')",
+        )
 
     def move(x: FloatArray, nodes: Any) -> FloatArray:
         result = x.copy()
