@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from two_blocks import blocks
 
-from gibiane_ops.kernels.contact.augmented import solve_uzawa
+from gibiane_ops.kernels.contact.augmented import solve_augmented_newton, solve_uzawa
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
@@ -16,6 +16,7 @@ from gibiane_ops.kernels.errors import NotConverged
 
 METHODS = {
     "NEWT": (solve_coulomb, (), (1, 2, 3, 4)),
+    "AUGM": (solve_augmented_newton, (1.0,), (1, 2, 3, 4)),
     "PROJ": (solve_gauss_seidel, (), (1, 3, 10, 30, 100)),
     "UZAW": (solve_uzawa, (1.0,), (1, 2, 4, 8, 16)),
     "STATUT": (solve_statuses, (), (1, 2, 4, 8)),
