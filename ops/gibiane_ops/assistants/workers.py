@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from importlib import import_module
 from typing import Any
 
@@ -104,19 +105,28 @@ def dask(study: bytes, numbers: Sequence[int], address: str, make_session: Calla
     distributed: Any = import_module("distributed")  # without types, and only on request
 
     with distributed.Client(address, timeout="5s") as client:
-        shared = client.scatter(study, hash=False)
-        futures = {
-            client.submit(run_case, shared, number, make_session, pure=False, key=f"case-{number}-{id(shared)}"): number
-            for number in numbers
-        }
-        done: set[int] = set()
-        try:
-            for future in distributed.as_completed(futures):
-                number = futures[future]
-                answer = future.result()
-                done.add(number)
-                yield number, answer
-        except distributed.KilledWorker as failure:
-            raise WorkersLost([n for n in numbers if n not in done], str(failure)) from failure
-        finally:
-            client.cancel(list(futures))
+        waiting = list(numbers)
+        losses = 0
+        while waiting:
+            # The study lies in the memory of one worker: when that one dies, it is sent again with what is missing.
+            shared = client.scatter(study, hash=False)
+            keys = {number: f"case-{number}-{shared.key}" for number in waiting}
+            futures = {
+                client.submit(run_case, shared, number, make_session, pure=False, key=keys[number]): number
+                for number in waiting
+            }
+            try:
+                for future in distributed.as_completed(futures):
+                    number = futures[future]
+                    answer = future.result()
+                    waiting.remove(number)
+                    losses = 0
+                    yield number, answer
+            except distributed.KilledWorker as failure:
+                raise WorkersLost(waiting, str(failure)) from failure
+            except CancelledError as failure:
+                losses += 1
+                if losses >= DEATHS:
+                    raise WorkersLost(waiting, str(failure)) from failure
+            finally:
+                client.cancel([*futures, shared])

@@ -101,7 +101,10 @@ def test_a_changed_procedure_is_run_again(tmp_path: Path) -> None:
 
 
 @needs_proc
-def test_a_killed_worker_of_a_cluster_loses_no_case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("holds_the_study", [True, False])
+def test_a_killed_worker_of_a_cluster_loses_no_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, holds_the_study: bool
+) -> None:
     distributed = pytest.importorskip(
         "distributed", reason="SKIPPED LOUDLY: no dask.distributed, the cluster is not tested"
     )
@@ -109,10 +112,16 @@ def test_a_killed_worker_of_a_cluster_loses_no_case(tmp_path: Path, monkeypatch:
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
     ) as cluster:
-        pids = list(cluster.workers.values())
-        victim = pids[0].pid
+        pids = {nanny.worker_address: nanny.pid for nanny in cluster.workers.values()}
         process = _run(tmp_path, "--dask", cluster.scheduler_address)
-        time.sleep(1.5)
+        with distributed.Client(cluster.scheduler_address) as client:
+            holders: tuple[str, ...] = ()
+            deadline = time.monotonic() + 60
+            while not holders and time.monotonic() < deadline:
+                time.sleep(0.02)
+                holders = next((who for key, who in client.who_has().items() if str(key).startswith("bytes-")), ())
+        first = holders[0]
+        victim = pids[first] if holds_the_study else next(pid for address, pid in pids.items() if address != first)
         assert process.poll() is None, "the study was over before its worker was killed"
         os.kill(victim, signal.SIGKILL)
         out, err = process.communicate(timeout=120)
