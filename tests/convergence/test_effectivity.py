@@ -68,4 +68,5 @@ def test_residuals_converge_like_the_error(shape):
 @pytest.mark.parametrize("n", [8, 16, 32])
 def test_equilibrated_stress_bounds_the_error(n):
     theta, _ = measured("TRI3", n)["RDC"]
-    assert 1 <= theta <= 1.25
+    # what is left above 1 comes from the chords that stand for the arcs, and goes with the size
+    assert 1 <= theta <= 1 + 0.8 / n

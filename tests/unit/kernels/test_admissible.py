@@ -13,13 +13,15 @@ from gibiane_ops.kernels.errors import NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import (
     admissible_stress,
     equilibrium_residual,
+    errors,
     plane_compliance,
     stress_at_corners,
 )
 from gibiane_ops.kernels.estimate.macro import STATIC, contraction, macro_element
 from gibiane_ops.kernels.estimate.pieces import aim_of, balanced_stress, cut
 from gibiane_ops.kernels.estimate.simplices import Simplices, colours, simplices
-from gibiane_ops.kernels.estimate.tractions import Exterior
+from gibiane_ops.kernels.estimate.stars import Improver
+from gibiane_ops.kernels.estimate.tractions import Exterior, balanced_tractions
 from gibiane_ops.kernels.geometry import facet_normals
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.solve import factorize
@@ -191,8 +193,29 @@ def test_equilibrium_and_identity_on_a_quadratic_field(dim, n):
     assert energy(true - at) + energy(true - raw) == pytest.approx(energy(at - raw), rel=1e-10)
     theta = np.array(found.history) / np.sqrt(energy(true - raw))
     assert (np.diff(theta) < 0).all()
-    assert 1 <= theta[2] <= 1.25
-    assert theta[1] <= 1.5
+    assert 1 <= theta[-1] <= {2: 1.05, 3: 1.25}[dim]
+    assert theta[1] <= {2: 1.05, 3: 1.5}[dim]
+
+
+def test_whole_plane_is_the_least_of_all_sweeps():
+    of = scene(2, 6)
+    _, exterior, stress = quadratic(2, 6)
+    found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=1)
+    mesh = found.mesh
+    free = np.broadcast_to(np.eye(2), (len(mesh.nodes), 2, 2)).copy()
+    free[mesh.boundary] = exterior.free
+    compliance = np.broadcast_to(of.compliance, (len(of.cells), 3, 3))
+    flat = stress[:, STATIC[2]]
+
+    def after(tau: np.ndarray, sweeps: int) -> float:
+        improver = Improver(mesh, flat, compliance, free)
+        for _ in range(sweeps):
+            improver.sweep(tau)
+        return float(np.sqrt(errors(mesh, tau, flat, compliance).sum()))
+
+    # stars that start from it find nothing to gain; from the balanced tractions they come near, never below
+    assert after(found.tau.copy(), 2) == pytest.approx(found.total, rel=1e-9)
+    assert found.total < after(balanced_tractions(mesh, flat, exterior), 10) < 1.2 * found.total
 
 
 def test_broken_equilibrium_is_seen():
@@ -215,6 +238,24 @@ def test_broken_equilibrium_is_seen():
     assert equilibrium_residual(found.mesh, found.tau, weightless) > 1e-3
     shifted = Exterior(exterior.traction + 0.01, exterior.free, exterior.body)
     assert equilibrium_residual(found.mesh, found.tau, shifted) > 1e-5
+
+
+def test_broken_equilibrium_of_the_whole_plane_is_seen():
+    of = scene(2, 4)
+    _, exterior, stress = quadratic(2, 4)
+    found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=1)
+    assert found.residual < 1e-12
+    inner = np.flatnonzero(found.mesh.cell[:, 1] >= 0)[5]
+    wrong = found.tau.copy()
+    wrong[inner] *= -1
+    assert equilibrium_residual(found.mesh, wrong, exterior) > 1e-3
+    # No resultant force, but a moment.
+    wrong = found.tau.copy()
+    line = np.diff(of.points[found.mesh.nodes[inner]], axis=0)[0]
+    wrong[inner] += 1e-3 * np.outer([1, -1], [-line[1], line[0]])
+    assert equilibrium_residual(found.mesh, wrong, exterior) > 1e-5
+    weightless = Exterior(exterior.traction, exterior.free, 0 * exterior.body)
+    assert equilibrium_residual(found.mesh, found.tau, weightless) > 1e-3
 
 
 def test_stress_of_other_loads_is_refused():
