@@ -47,7 +47,12 @@ FLAT = 1e-6
     Arg("u", CHPOINT, "displacement"),
     Arg("rea", CHPOINT, "contact forces (REAC)"),
     *LOADS,
-    Key("BALAYAGES", "improvements around each node (2); in a plane of the whole: one is the best", Arg("n", ENTIER), name="sweeps"),
+    Key(
+        "BALAYAGES",
+        "improvements around each node (2); in a plane of the whole: one is the best",
+        Arg("n", ENTIER),
+        name="sweeps",
+    ),
     NORM,
     TABL,
     gives=[FLOTTANT, FLOTTANT, FLOTTANT, MCHAML],

@@ -39,7 +39,12 @@ RESIDUALS = Guarantee(False, "explicit residuals follow the error up to a factor
     Arg("sig", MCHAML, "stress"),
     Arg("mat", MCHAML, "material"),
     *LOADS,
-    Key("BALAYAGES", "improvements around each node (2); in a plane of the whole: one is the best", Arg("n", ENTIER), name="sweeps"),
+    Key(
+        "BALAYAGES",
+        "improvements around each node (2); in a plane of the whole: one is the best",
+        Arg("n", ENTIER),
+        name="sweeps",
+    ),
     KIND,
     NORM,
     TABL,
