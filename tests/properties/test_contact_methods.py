@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 
 from gibiane_ops.kernels.contact.interface import Interface, bare_interface
 from gibiane_ops.kernels.contact.law import friction
+from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.outcome import accepted
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged, StatusCycle
 from gibiane_ops.values.methods import Method
@@ -78,6 +80,30 @@ def test_what_an_exact_method_returns_obeys_every_law(method, seed, n, dim, mu, 
     assert (friction_force - bound).max() <= near * max(bound.max(), 1e-6 * force)
     slip = np.linalg.norm(w[:, 1:], axis=1)
     assert np.abs(bound * slip + (r[:, 1:] * w[:, 1:]).sum(axis=1)).max() <= near * force * length
+
+
+@settings(deadline=None, max_examples=30, suppress_health_check=[HealthCheck.too_slow])
+@given(SEEDS, st.integers(1, 6), st.sampled_from([2, 3]), st.sampled_from([0.0, 0.2]), st.booleans())
+def test_cohesion_acts_on_pairs_in_contact_only(seed, n, dim, mu, gap):
+    """Forces with cohesion and Tresca's bound, where pairs open: a state that obeys the law is not refused."""
+    interface = random_interface(seed, n, dim, gap=gap, loose=False)
+    cohesion = np.random.default_rng(seed).uniform(0, 0.5, n)
+    law = friction(n, mu=mu, cohesion=cohesion)
+    try:
+        state = solve_coulomb(interface, law)
+    except NotConverged as failure:
+        # only a residual that is large may fail: the check of the laws agrees with the equations
+        assert failure.best.report.worst > 1e-6
+        assert min(failure.history) > 1e-9
+        return
+    assert accepted(state, None) is state
+    closed = state.r[:, 0] < -1e-9
+    assert (np.linalg.norm(state.r[~closed], axis=1) <= 1e-8).all()
+    size = np.linalg.norm(state.r[:, 1:], axis=1)
+    bound = cohesion - mu * state.r[:, 0]
+    assert (size[closed] <= bound[closed] + 1e-8).all()
+    sticks = closed & (size < bound - 1e-7)
+    assert (np.abs(state.w[sticks, 1:]) <= 1e-7).all()
 
 
 @SLOW

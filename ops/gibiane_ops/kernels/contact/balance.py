@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.contact.cone import norms, radial_projection
+from gibiane_ops.kernels.contact.cone import norms
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.report import ContactState
@@ -104,17 +106,23 @@ def raise_if_runaway(interface: Interface, last: ContactState, best: ContactStat
     Raises
     ------
     ContactUnbalanced
-        When the free motion exceeds ``RUNAWAY`` times the natural length of the interface.
+        When the free motion exceeds ``RUNAWAY`` times the natural length of the interface, and the last forces, cut at
+        the bound of friction, leave a part of the load.
     """
     R = interface.rigid
     motion = (R @ (R.T @ last.w.ravel())).reshape(last.w.shape)
     size = float(np.abs(motion).max(initial=0))
     if size > RUNAWAY * interface.length_scale > 0:
-        r = radial_projection(last.r, last.law.mu)
+        law, length = last.law, norms(last.r[:, 1:])
+        # a pair that the runaway has opened might have kept its cohesion in a solution that was not found
+        bound = np.where(law.exponent > 0, np.inf, replace(law, when_open=True).bound(last.r[:, 0]))
+        cut = np.divide(bound, length, out=np.ones_like(length), where=length > bound)
+        r = np.column_stack([np.minimum(last.r[:, 0], 0.0), cut[:, None] * last.r[:, 1:]])
         load = float(np.linalg.norm(R.T @ interface.f)) or interface.force_scale
         share = float(np.linalg.norm(R.T @ (interface.f + r.ravel()))) / load
         motion = motion / size
-        raise ContactUnbalanced(kind_of_motion(motion, last.law.mu), share, motion, best.history, best)
+        if share > UNBALANCED:
+            raise ContactUnbalanced(kind_of_motion(motion, law.mu), share, motion, best.history, best)
 
 
 def kind_of_motion(motion: FloatArray, mu: FloatArray) -> str:

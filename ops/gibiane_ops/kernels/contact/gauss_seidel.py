@@ -11,7 +11,7 @@ from gibiane_ops.kernels.contact.balance import raise_if_unbalanced
 from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import first_guess
+from gibiane_ops.kernels.contact.newton_steps import first_guess
 from gibiane_ops.kernels.contact.outcome import PATIENCE, finished, physical_state
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState

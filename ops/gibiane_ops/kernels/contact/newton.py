@@ -2,40 +2,39 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
-from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.balance import raise_if_runaway, raise_if_unbalanced
 from gibiane_ops.kernels.contact.drift import without_drift
 from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction, friction
+from gibiane_ops.kernels.contact.newton_steps import (
+    SOFT_GAMMA,
+    Iterate,
+    first_guess,
+    newton_steps,
+    other_paths,
+    robust_steps,
+)
 from gibiane_ops.kernels.contact.outcome import physical_state
 from gibiane_ops.kernels.contact.problem import BoolArray, Problem
 from gibiane_ops.kernels.contact.report import STICK, ContactState, check_state
 from gibiane_ops.kernels.contact.splitting import splitting_steps
 from gibiane_ops.kernels.errors import NotConverged
 
-ROUND_OFF = 1e-14
-"""Residual, over the largest load, that no step improves."""
-
-SOFT_GAMMA = 1e-3
-"""Second value of gamma: pairs whose slip is small and turns back and forth settle with it."""
-
 _FEW = 20
 """Steps of an attempt that either succeeds soon or not at all."""
 
-_STALL = 8
-"""Full steps without a better residual after which another attempt is made."""
+_FROZEN = 12
+"""Problems with a frozen bound before Newton's steps take over."""
 
 _SPLITTINGS = 6000
 """Alternations of the last attempt."""
-
-_MEMORY = 4
-"""A damped step must improve on the worst of the last few residuals, not on the last one."""
 
 
 def solve_coulomb(
@@ -132,91 +131,6 @@ def solve_tied(interface: Interface) -> ContactState:
     return check_state(interface, np.zeros((n, d)), r, status, friction(n, mu=np.inf), [], None)
 
 
-@dataclass(frozen=True, eq=False)
-class Iterate:
-    """A pair (w, r) in the units of a problem, with its statuses and residual."""
-
-    w: FloatArray
-    r: FloatArray
-    status: IntArray
-    residual: float
-    converged: bool
-
-    @staticmethod
-    def of(problem: Problem, w: FloatArray, r: FloatArray, tolerance: float) -> Iterate:
-        """Measure w and r."""
-        residual = problem.merit(w, r)
-        status = problem.project(problem.augmented(w, r))[1]
-        return Iterate(w, r, status, residual, residual <= tolerance)
-
-    def better(self, other: Iterate) -> Iterate:
-        """Return the one with the smaller residual."""
-        return other if other.residual < self.residual else self
-
-
-def newton_steps(
-    problem: Problem,
-    first: tuple[FloatArray, FloatArray],
-    tolerance: float,
-    max_iter: int,
-    history: History,
-    *,
-    damped: bool = False,
-) -> tuple[Iterate, Iterate]:
-    """Run Newton steps from a first guess and give the best iterate met, and the last.
-
-    Parameters
-    ----------
-    problem : Problem
-    first : tuple of (n, d) float64
-        w and r in the units of the problem.
-    tolerance : float
-    max_iter : int
-    history : History
-        Grows by one residual a step.
-    damped : bool
-        Shorten each step until the residual is below the worst of the last few.
-
-    Returns
-    -------
-    best, last : Iterate
-    """
-    w, r = first
-    recent = [_energy(problem, w, r)]
-    best = now = Iterate.of(problem, w, r, tolerance)
-    stalled, polished = 0, False
-    for _ in range(max_iter):
-        # a last step after convergence costs little and leaves round-off only, even where friction is weak
-        if best.residual <= ROUND_OFF or (best.converged and polished):
-            break
-        polished = best.converged
-        try:
-            dw, dr = problem.step(w, r)
-        except np.linalg.LinAlgError:
-            break
-        t = 1.0
-        while damped and t >= 1e-3:
-            if _energy(problem, w + t * dw, r + t * dr) <= (1 - 1e-4 * t) * max(recent):
-                break
-            t /= 2
-        w, r = w + t * dw, r + t * dr
-        recent = [*recent[-_MEMORY + 1 :], _energy(problem, w, r)]
-        now = Iterate.of(problem, w, r, tolerance)
-        history.add(now.residual, now.status)
-        best = best.better(now)
-        stalled = 0 if best is now else stalled + 1
-        if not damped and stalled >= _STALL:
-            break
-    return best, now
-
-
-def first_guess(problem: Problem, start: ContactState | None) -> tuple[FloatArray, FloatArray]:
-    """Give w and r of a state in the units of a problem; of tied bodies without a state."""
-    if start is None:
-        return problem.tied()
-    return start.w / problem.length, start.r / problem.force
-
-
 def _solve(
     interface: Interface,
     law: Friction,
@@ -238,12 +152,14 @@ def _solve(
         raise_if_unbalanced(interface, state(best))
         if law.rubs.any():
             best = best.better(_from_frictionless(interface, problem, tolerance, history))
+    if not best.converged and law.cohesion.any() and not law.adhesion.any():
+        best = best.better(_from_frozen_bounds(problem, tolerance, max_iter, history))
     if not best.converged:
         # slip may spread from pair to pair, one a step: go on as long as there is progress
         more, last = newton_steps(problem, (last.w, last.r), tolerance, 2 * interface.n_pairs, history)
         best = best.better(more)
     if not best.converged:
-        best = best.better(_other_paths(problem, first, tolerance, max_iter, history))
+        best = best.better(other_paths(problem, first, tolerance, max_iter, history))
     soft = replace(problem, gamma=min(problem.gamma, SOFT_GAMMA))
     if not best.converged and law.rubs.any():
         best = best.better(_grow_friction(soft, first, tolerance, max_iter, history))
@@ -265,39 +181,18 @@ def _from_frictionless(interface: Interface, problem: Problem, tolerance: float,
     return newton_steps(replace(smooth, law=problem.law), first, tolerance, _FEW, history, damped=True)[0]
 
 
-def robust_steps(
-    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: History
-) -> Iterate:
-    """Run full steps, then if needed softer and damped ones, and give the best iterate met.
+def _from_frozen_bounds(problem: Problem, tolerance: float, max_iter: int, history: History) -> Iterate:
+    """Freeze the bound of friction and update it: with cohesion it jumps where a pair opens, and full steps may cycle.
 
-    Parameters
-    ----------
-    problem : Problem
-    first : tuple of (n, d) float64
-    tolerance : float
-    max_iter : int
-        Steps of each attempt.
-    history : History
-        Grows by one residual a step.
-
-    Returns
-    -------
-    Iterate
+    The last of the problems with a frozen bound, each a convex one, gives Newton's first guess.
     """
-    best = newton_steps(problem, first, tolerance, max_iter, history)[0]
-    return best if best.converged else best.better(_other_paths(problem, first, tolerance, max_iter, history))
-
-
-def _other_paths(
-    problem: Problem, first: tuple[FloatArray, FloatArray], tolerance: float, max_iter: int, history: History
-) -> Iterate:
-    # the gamma of a penalty is its stiffness and stays
-    soft = problem if problem.penalty else replace(problem, gamma=min(problem.gamma, SOFT_GAMMA))
-    best = Iterate.of(problem, *first, tolerance)
-    for attempt, damped in ((soft, False), (problem, True), (soft, True)):
-        if not best.converged:
-            best = best.better(newton_steps(attempt, first, tolerance, max_iter, history, damped=damped)[0])
-    return best
+    law, guess = problem.law, problem.tied()
+    for _ in range(_FROZEN):
+        bound = np.minimum(law.bound(guess[1][:, 0]), 1e6)
+        frozen = replace(law, mu=np.zeros_like(bound), cohesion=bound, when_open=True)
+        found = robust_steps(replace(problem, law=frozen), guess, tolerance, max_iter, history)
+        guess = found.w, found.r
+    return newton_steps(problem, guess, tolerance, _FEW, history)[0]
 
 
 def _grow_friction(
@@ -324,8 +219,3 @@ def _from_splitting(
             if best.converged:
                 break
     return best
-
-
-def _energy(problem: Problem, w: FloatArray, r: FloatArray) -> float:
-    E1, E2 = problem.residuals(w, r)
-    return float(np.sqrt((E1**2).sum() + (E2**2).sum()))

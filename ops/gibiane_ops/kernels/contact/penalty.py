@@ -8,7 +8,7 @@ from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import Iterate, first_guess, newton_steps
+from gibiane_ops.kernels.contact.newton_steps import Iterate, first_guess, newton_steps
 from gibiane_ops.kernels.contact.outcome import finished, physical_state
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState

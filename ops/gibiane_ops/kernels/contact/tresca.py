@@ -10,7 +10,7 @@ from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.history import History
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
-from gibiane_ops.kernels.contact.newton import first_guess, robust_steps
+from gibiane_ops.kernels.contact.newton_steps import first_guess, robust_steps
 from gibiane_ops.kernels.contact.outcome import finished, physical_state
 from gibiane_ops.kernels.contact.problem import Problem
 from gibiane_ops.kernels.contact.report import ContactState
