@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gibiane_ops.kernels.contact.interface import Interface, bare_interface
-from gibiane_ops.kernels.contact.law import friction
+from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.outcome import accepted
 from gibiane_ops.kernels.contact.report import ContactState
@@ -44,6 +44,14 @@ def attempt(method: Method, interface: Interface, mu: float) -> ContactState | N
         return method.solve(interface, law)
     except FAILURES:
         return None
+
+
+def found_or_best(interface: Interface, law: Friction) -> ContactState:
+    """Solve by the default method, or give the best iterate."""
+    try:
+        return solve_coulomb(interface, law)
+    except NotConverged as failure:
+        return failure.best
 
 
 def name_of(method: Method) -> str:
@@ -89,12 +97,10 @@ def test_cohesion_acts_on_pairs_in_contact_only(seed, n, dim, mu, gap):
     interface = random_interface(seed, n, dim, gap=gap, loose=False)
     cohesion = np.random.default_rng(seed).uniform(0, 0.5, n)
     law = friction(n, mu=mu, cohesion=cohesion)
-    try:
-        state = solve_coulomb(interface, law)
-    except NotConverged as failure:
-        # only a residual that is large may fail: the check of the laws agrees with the equations
-        assert failure.best.report.worst > 1e-6
-        assert min(failure.history) > 1e-9
+    state = found_or_best(interface, law)
+    if min(state.history, default=0.0) > 1e-9:
+        # what has not converged is not taken for a solution by the measures either
+        assert state.report.worst > 1e-6
         return
     assert accepted(state, None) is state
     closed = state.r[:, 0] < -1e-9
