@@ -100,6 +100,8 @@ class Iteration:
             old, r = r, r - step * q
             count += 1
             active = active & (np.linalg.norm(r, axis=0) > wanted)
+            if not active.any():
+                break
             z = self._precondition(r)
             new = (r * z).sum(axis=0)
             p = z + np.divide(new - (old * z).sum(axis=0), rz, out=np.zeros_like(rz), where=active) * p

@@ -27,6 +27,7 @@ from gibiane_ops.kernels.contact.tied import TiedSolver, tied_solver
 from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.errors import SingularSystem, TooLarge
 from gibiane_ops.kernels.packages import is_installed
+from gibiane_ops.kernels.products import whole_product
 from gibiane_ops.kernels.solve import ITERATIVE, Factor
 
 BoolArray = NDArray[np.bool_]
@@ -371,7 +372,7 @@ def condense(
     Kvw = sp.csr_array(fields.Bv.T @ KBw)
     try:
         roots = fields.roots() if method in ITERATIVE else None
-        tied = tied_solver(sp.csr_array(fields.Bv.T @ K @ fields.Bv), method=method, roots=roots, points=points)
+        tied = tied_solver(whole_product(fields.Bv, K), method=method, roots=roots, points=points)
     except SingularSystem as error:
         moving = np.unique(fields.Bv[:, error.unknowns].nonzero()[0])
         raise SingularSystem(f"tied bodies: {error.message}", np.unique(moving // d), moving) from error

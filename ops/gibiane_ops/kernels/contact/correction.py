@@ -20,6 +20,12 @@ from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged, StatusCy
 AGREEMENT = 1e-9
 """Largest difference between the forces of the small model and the true ones, over the largest force."""
 
+REST = 1e-11
+"""Norm of the forces that a solution with a factor in single precision may leave, over the largest force."""
+
+ROUGHEST = 1e-5
+"""Largest relative residual of such a solution: less would spoil what the small model learns from it."""
+
 LOOSE = 1e-9
 """Relative residual of the tied solution, for iterations, at which contact may stop."""
 
@@ -172,10 +178,10 @@ def solve_corrected(
             state = replace(state, history=[*before.history, *state.history])
         before = state
         new_w = state.w.ravel()
-        x, y_new = _true_force(bodies, new_w, w, x, y)
+        scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
+        x, y_new = _true_force(bodies, new_w, w, x, y, rest=REST * scale)
         bodies.learned = bodies.learned.learned(new_w - w, y_new - y)
         true = y_new - load.f
-        scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
         active = bodies.active.ravel()
         differences.append(float(np.abs(true - state.r.ravel())[active].max(initial=0)) / scale)
         w, y = new_w, y_new
@@ -229,14 +235,16 @@ def _around(bodies: Condensation, load: TiedSolution, gap: FloatArray, w: FloatA
 
 
 def _true_force(
-    bodies: Condensation, w: FloatArray, w_before: FloatArray, x_before: FloatArray, y_before: FloatArray
+    bodies: Condensation, w: FloatArray, w_before: FloatArray, x_before: FloatArray, y_before: FloatArray, rest: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve ``Kvv x = Kvw w`` once, from the x before, and give x and ``S w``."""
+    """Solve ``Kvv x = Kvw w`` once, from the x before, and give x and ``S w``; a factor leaves a residual below rest."""
     assert bodies.learned is not None
     if bodies.tied.direct:
         # of the change alone: round-off of a body that has slid far would hide the last corrections
         dw = w - w_before
-        dx = bodies.tied.once(bodies.coupling(dw))
+        right = bodies.coupling(dw)
+        size = float(np.linalg.norm(right))
+        dx = bodies.tied.once(right, min(rest / size, ROUGHEST) if size else None)
         return x_before + dx, y_before + bodies.learned.still(bodies.force(dw, dx))
     right = bodies.coupling(w)
     x = x_before if x_before.any() else bodies.recalled(w)

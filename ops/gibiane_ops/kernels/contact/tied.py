@@ -47,11 +47,14 @@ class TiedSolver:
         """Whether a factor gives exact solutions."""
         return self.factor.name not in ITERATIVE
 
-    def once(self, b: FloatArray) -> FloatArray:
-        """Solve exactly with a factor, to the relative residual ``PASS`` by iterations."""
+    def once(self, b: FloatArray, tolerance: float | None = None) -> FloatArray:
+        """Solve exactly with a factor, to the relative residual ``PASS`` by iterations.
+
+        A factor in single precision is corrected to the tolerance, if one is given.
+        """
         start = time.perf_counter()
         if self._place is None:
-            x = self.factor.solve(b)
+            x = self.factor.solve(b, tolerance)
         else:
             padded = np.zeros((self.factor.shape[0], *b.shape[1:]))
             padded[self._place] = b
