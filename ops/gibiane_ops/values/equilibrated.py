@@ -132,8 +132,11 @@ def energy_bounds(found: Admissible, contact: float = 0.0) -> dict[str, float]:
 
 def _unbalanced(ctx: Context, nodes: IntArray, forces: FloatArray) -> NoReturn:
     """Fail because forces are left at nodes."""
-    where = " ".join(f"{x:g}" for x in node_store(ctx).coords[nodes[0]][: forces.shape[1]])
-    left = forces[0]
+    # the two sides of a contact keep opposite forces: of equal ones the first node is named, whatever round-off says
+    size = np.linalg.norm(forces, axis=1)
+    worst = min(np.flatnonzero(size > (1 - 1e-6) * size.max()), key=lambda i: nodes[i])
+    where = " ".join(f"{x:g}" for x in node_store(ctx).coords[nodes[worst]][: forces.shape[1]])
+    left = forces[worst]
     force = " ".join(f"{x:.4g}" for x in np.where(np.abs(left) > 1e-9 * np.abs(left).max(), left, 0.0))
     ctx.fail(
         21,
@@ -141,7 +144,7 @@ def _unbalanced(ctx: Context, nodes: IntArray, forces: FloatArray) -> NoReturn:
         "({where}), force ({force})",
         at="sig",
         count=len(nodes),
-        node=int(nodes[0]) + 1,
+        node=int(nodes[worst]) + 1,
         where=where,
         force=force,
         hint="give every load by 'PRES', 'FSUR' or 'VOLU' and the supports; forces and supports at single "

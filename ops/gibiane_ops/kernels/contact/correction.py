@@ -237,7 +237,7 @@ def _around(bodies: Condensation, load: TiedSolution, gap: FloatArray, w: FloatA
 def _true_force(
     bodies: Condensation, w: FloatArray, w_before: FloatArray, x_before: FloatArray, y_before: FloatArray, rest: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Solve ``Kvv x = Kvw w`` once, from the x before, and give x and ``S w``; a factor leaves a residual below rest."""
+    """Solve ``Kvv x = Kvw w`` once, from the x before, and give x and ``S w``; a factor leaves less than the rest."""
     assert bodies.learned is not None
     if bodies.tied.direct:
         # of the change alone: round-off of a body that has slid far would hide the last corrections
