@@ -1,7 +1,7 @@
 """Size maps, meshes from a field of sizes against gmsh alone, and the least cost for a prescribed error.
 
-The exhaustive table runs every method and element on three scenes, each in a process of its own and stopped as soon as it
-cannot be the best any more; the time of ADAPTER 'OBJE' 'COUT', choice included, is compared to the best of those that
+The exhaustive table runs every method and element on three scenes, each in a process of its own and stopped when it
+can no longer be the best; the time of ADAPTER 'OBJE' 'COUT', choice included, is compared to the best of those that
 reach the error. It takes two minutes.
 """
 
