@@ -93,7 +93,7 @@ def _corners(ctx: Context, zone: ModelZone) -> FloatArray:
 def _matrix(ctx: Context, zones: list[ModelZone], each: list[FloatArray]) -> Rigidite:
     mesh = Maillage(node_store(ctx), [b for zone in zones for b in zone.mesh.blocks])
     nodes = mesh.nodes
-    blocks = [(np.searchsorted(nodes, zone.cells), Ke) for zone, Ke in zip(zones, each, strict=True)]
+    blocks = [(topology.places_in(nodes, zone.cells), Ke) for zone, Ke in zip(zones, each, strict=True)]
     return Rigidite([MatrixPart(nodes, (UNKNOWN,), (DUAL,), assembly.assemble(len(nodes), 1, blocks), mesh)])
 
 
@@ -130,7 +130,7 @@ def _heat(ctx: Context, zone: ModelZone, blocks: list[tuple[str, IntArray, Float
         x = store.coords[cells][..., : zone.dim]
         with worded(ctx, at="g"):
             loads = heat.scalar_load(shape(name), x, density, axisymmetric=zone.axisymmetric)
-        local.append((np.searchsorted(nodes, cells), loads[..., None]))
+        local.append((topology.places_in(nodes, cells), loads[..., None]))
     total = assembly.assemble_vector(len(nodes), 1, local)
     return ChPoint(store, {DUAL: (nodes, total)}, DISCRET)
 

@@ -112,9 +112,7 @@ Loaded = list[tuple[str, IntArray]]
 def _sum(ctx: Context, zone: ModelZone, blocks: list[tuple[IntArray, FloatArray]]) -> ChPoint:
     """Return the field of the forces of elements, (m, n, d) each."""
     nodes = topology.used_nodes([cells for cells, _ in blocks])
-    number = np.zeros(int(nodes.max(initial=-1)) + 1, np.int64)
-    number[nodes] = np.arange(len(nodes))
-    local = [(number[cells], forces) for cells, forces in blocks]
+    local = [(topology.places_in(nodes, cells), forces) for cells, forces in blocks]
     total = assembly.assemble_vector(len(nodes), zone.dim, local).reshape(-1, zone.dim)
     return ChPoint.from_table(node_store(ctx), FORCES[zone.family], nodes, total, DISCRET)
 

@@ -13,6 +13,7 @@ from gibiane.registry import Context, Operator, Refused, extend, operator
 from gibiane.values import CHPOINT, FLOTTANT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT, RIGIDITE
 from gibiane_ops.kernels import assembly
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.topology import places_in
 from gibiane_ops.values.champs import DISCRET, ChPoint, MChaml
 from gibiane_ops.values.conditions import family, support
 from gibiane_ops.values.failures import worded
@@ -64,7 +65,7 @@ def _masses(ctx: Context, model: Modele, material: MChaml, lumped: bool) -> Rigi
         compute = assembly.lumped_mass if lumped else assembly.element_mass
         with worded(ctx, at="model"):
             each = compute(of, x, density.prod(axis=-1), axisymmetric=zone.axisymmetric)
-        blocks.append((np.searchsorted(nodes, zone.cells), each))
+        blocks.append((places_in(nodes, zone.cells), each))
     if lumped:
         local = [(cells, each[..., None]) for cells, each in blocks]
         scalar = sp.diags_array(assembly.assemble_vector(len(nodes), 1, local))

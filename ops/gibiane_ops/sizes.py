@@ -14,6 +14,7 @@ from gibiane_ops.kernels.adapt.diameters import smallest_lengths
 from gibiane_ops.kernels.adapt.orders import fitted_orders, singular_orders
 from gibiane_ops.kernels.adapt.sizes import size_map
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.topology import places_in, used_nodes
 from gibiane_ops.values.algebra import SCAL
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
 from gibiane_ops.values.failures import worded
@@ -97,9 +98,9 @@ def _wanted(
     store = node_store(ctx)
     zones = solid_zones(ctx, model)
     error = error_map(ctx, carte, zones)
-    nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
+    nodes = used_nodes([z.cells for z in zones])
     points = store.coords[nodes][:, : zones[0].dim]
-    blocks = [(z.shape, np.searchsorted(nodes, z.cells)) for z in zones]
+    blocks = [(z.shape, places_in(nodes, z.cells)) for z in zones]
     degrees = np.concatenate([np.full(len(z.cells), float(shape(z.shape).degree)) for z in zones])
     order: float | FloatArray = ordre if ordre is not None else degrees if np.ptp(degrees) else float(degrees[0])
     with worded(ctx, at="prec"):

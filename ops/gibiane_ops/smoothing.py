@@ -11,6 +11,7 @@ from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, MCHAML, MMODEL
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
+from gibiane_ops.kernels.topology import places_in
 from gibiane_ops.values.balance import known_tractions
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import zone_pairs
@@ -154,7 +155,7 @@ def _field(ctx: Context, solids: list[Solid], where: str | None) -> MChaml | ChP
     zones = []
     for solid in solids:
         for zone in solid.zones:
-            at_nodes = solid.nodal[np.searchsorted(solid.nodes, zone.cells)]
+            at_nodes = solid.nodal[places_in(solid.nodes, zone.cells)]
             values = at_nodes if where != "STRESSES" else moved(shape(zone.shape), at_nodes, "NOEUD", "STRESSES")
             zones.append(ChamZone(zone, zone.stresses, values))
     return MChaml(zones, STRESS, "STRESSES" if where == "STRESSES" else "NOEUD")

@@ -10,6 +10,7 @@ from gibiane.forms import Arg
 from gibiane.registry import Context, extend, operator
 from gibiane.values import MAILLAGE, MCHAML, MMODEL, RIGIDITE
 from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels.topology import places_in
 from gibiane_ops.values import mechanics
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.contact import NEEDS, warn_unpaired, zone_friction, zone_gap, zone_pairs
@@ -55,7 +56,7 @@ def _solid(ctx: Context, model: Modele, material: MChaml) -> Rigidite:
     family, dim = zones[0].family, zones[0].dim
     mesh = Maillage(store, [b for zone in zones for b in zone.mesh.blocks])
     nodes = mesh.nodes
-    blocks = [(np.searchsorted(nodes, zone.cells), mechanics.stiffness(ctx, zone, material)) for zone in zones]
+    blocks = [(places_in(nodes, zone.cells), mechanics.stiffness(ctx, zone, material)) for zone in zones]
     matrix = assembly.assemble(len(nodes), dim, blocks)
     part = MatrixPart(nodes, DISPLACEMENTS[family], FORCES[family], matrix, mesh)
     part.origin = model, material

@@ -13,6 +13,7 @@ from gibiane_ops.kernels import assembly, invariants
 from gibiane_ops.kernels.arrays import strain_tensor, stress_tensor
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
+from gibiane_ops.kernels.topology import places_in, used_nodes
 from gibiane_ops.values import mechanics
 from gibiane_ops.values.algebra import SCAL, SCALAIRE
 from gibiane_ops.values.champs import DISCRET, ChamZone, ChPoint, MChaml
@@ -214,8 +215,8 @@ def _bsig(ctx: Context, model: Modele, stress: MChaml, more: MChaml | None) -> C
         of = shape(zone.shape)
         values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
         parts.append((zone.cells, mechanics.internal_forces(ctx, zone, values)))
-    nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in parts]))
-    local = [(np.searchsorted(nodes, cells), forces) for cells, forces in parts]
+    nodes = used_nodes([cells for cells, _ in parts])
+    local = [(places_in(nodes, cells), forces) for cells, forces in parts]
     total = assembly.assemble_vector(len(nodes), dim, local).reshape(-1, dim)
     return ChPoint.from_table(store, names, nodes, total, DISCRET)
 

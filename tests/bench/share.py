@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 BEGIN = time.perf_counter()
+KINDS = ("imports", "numerical", "language")
 
 
 def place(frame):
@@ -33,7 +34,7 @@ def watch(thread, times, done):
         now = time.perf_counter()
         if frame is not None:
             kind = place(frame)
-            times[kind] = times.get(kind, 0.0) + now - last
+            times[kind] += now - last
         last = now
 
 
@@ -48,7 +49,7 @@ def highest_memory():
 
 
 def main(script):
-    times, done = {}, threading.Event()
+    times, done = dict.fromkeys(KINDS, 0.0), threading.Event()
     watcher = threading.Thread(target=watch, args=(threading.get_ident(), times, done), daemon=True)
     watcher.start()
     from gibiane.cli import main as run

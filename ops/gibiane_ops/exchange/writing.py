@@ -16,7 +16,7 @@ from gibiane.values import CHPOINT, MAILLAGE, MOT, TABLE, Table
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.exchange.formats import FORMATS, write_mesh_file
 from gibiane_ops.kernels.exchange.meshfile import MeshFile
-from gibiane_ops.kernels.topology import group_by_nodes
+from gibiane_ops.kernels.topology import group_by_nodes, places_in, used_nodes
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
@@ -112,8 +112,8 @@ def _content(ctx: Context, meshes: list[tuple[str, Maillage]], fields: list[tupl
             start += len(cells)
     if not blocks:
         ctx.fail(21, "there is nothing to write: the mesh is empty")
-    nodes = np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
-    local = [(name, np.searchsorted(nodes, cells)) for name, cells in blocks]
+    nodes = used_nodes([cells for _, cells in blocks])
+    local = [(name, places_in(nodes, cells)) for name, cells in blocks]
     data = {}
     for number, (name, field) in enumerate(fields, 1):
         # multipliers stand on nodes of their own, which are not in the file

@@ -14,6 +14,7 @@ from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
+from gibiane_ops.kernels.topology import places_in, used_nodes
 from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, chosen
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
 from gibiane_ops.values.listes import ListMots
@@ -43,8 +44,8 @@ def _to_nodes(ctx: Context, chpo: bool, model: Modele, field: MChaml, how: str |
     parts = {}
     for name in field.names:
         having = [(z, v) for z, v in zones if name in v.names]
-        nodes = np.unique(np.concatenate([z.cells.ravel() for z, _ in having]))
-        cells = [np.searchsorted(nodes, z.cells) for z, _ in having]
+        nodes = used_nodes([z.cells for z, _ in having])
+        cells = [places_in(nodes, z.cells) for z, _ in having]
         values = [_at_nodes(z, v.component(name)[..., None], field) for z, v in having]
         mean = nodal_mean(len(nodes), cells, values)[:, 0]
         if how == "SOMM":

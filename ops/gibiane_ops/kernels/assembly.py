@@ -345,12 +345,15 @@ def pressure_load(face_shape: Shape, X: FloatArray, p: ArrayLike, *, axisymmetri
     points, weights = face_shape.mass_gauss
     N = face_shape.N(points)
     value = np.asarray(p, np.float64)
-    at_points = value @ N.T if value.ndim == 2 else np.broadcast_to(value[..., None], (len(X), len(weights)))
-    if axisymmetric:
-        at_points = at_points * geometry.circumferences(face_shape, X, points)
-    flux = geometry.normal_densities(face_shape, X, points)
-    flux *= (-at_points * weights)[..., None]
-    return np.asarray(np.matmul(flux.transpose(0, 2, 1), N).transpose(0, 2, 1), np.float64)
+    forces = np.empty(X.shape)
+    for start in range(0, len(X), 16 * geometry.PIECE):
+        part = slice(start, start + 16 * geometry.PIECE)
+        at_points = value if value.ndim == 0 else value[part] if value.ndim == 1 else (value[part] @ N.T).T
+        if axisymmetric:
+            at_points = at_points * geometry.circumferences(face_shape, X[part], points).T
+        flux = geometry.normal_densities(face_shape, X[part], points).T * (-weights[:, None] * at_points)
+        forces[part] = np.matmul(N.T, flux).T
+    return forces
 
 
 def distributed_load(shape: Shape, X: FloatArray, density: ArrayLike, *, axisymmetric: bool = False) -> FloatArray:

@@ -13,6 +13,8 @@ from gibiane_ops.kernels.errors import BadValue, InvertedElement
 
 # A jacobian below this share of the product of its column lengths is a flat cell seen through round-off.
 FLAT = 1e-12
+PIECE = 1024
+"""Cells worked on at a time, where their arrays would otherwise leave the cache."""
 
 
 def jacobians(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
@@ -277,15 +279,24 @@ def normal_densities(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
         ``n dS = normal_density * (weights of the reference rule)``; outward when the nodes turn counterclockwise
         seen from outside (3D), or when the solid lies on the left of the segment (2D).
     """
-    J = jacobians(shape, X, xi)
     if X.shape[2] == 2:
+        J = jacobians(shape, X, xi)
         return np.stack([J[..., 1, 0], -J[..., 0, 0]], axis=-1)
-    # written out: `numpy.cross` takes several times as long on many small vectors
-    normal = np.empty((len(X), 3, len(xi)))
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.multiply(J[..., j, 0], J[..., k, 1], out=normal[:, i])
-        normal[:, i] -= J[..., k, 0] * J[..., j, 1]
-    return normal.transpose(0, 2, 1)
+    # Component by component over many facets, which vectorises; `numpy.cross` on small vectors takes several times as
+    # long. In pieces that stay in the cache, whose products are too small to wake BLAS threads.
+    m, n, _ = X.shape
+    q = len(xi)
+    dN = shape.dN(xi).transpose(2, 0, 1).reshape(-1, n)
+    normal = np.empty((3, q, m))
+    for start in range(0, m, PIECE):
+        stop = min(start + PIECE, m)
+        tangents = np.matmul(dN, np.ascontiguousarray(X[start:stop].transpose(2, 1, 0)))
+        u, v = tangents[:, :q], tangents[:, q:]
+        for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+            part = normal[i, :, start:stop]
+            np.multiply(u[j], v[k], out=part)
+            part -= u[k] * v[j]
+    return normal.transpose(2, 1, 0)
 
 
 def facet_normals(shape: Shape, X: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ from gibiane.nodes import Name
 from gibiane.registry import Context, Refused, extend
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, MMODEL, MOT, TABLE, Table
 from gibiane_ops.kernels.io import write_mesh
-from gibiane_ops.kernels.topology import group_by_nodes
+from gibiane_ops.kernels.topology import group_by_nodes, places_in, used_nodes
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
@@ -134,7 +134,7 @@ def _blocks(ctx: Context, content: _Content) -> list[tuple[str, IntArray]]:
 
 def _data(ctx: Context, content: _Content, blocks: list[tuple[str, IntArray]]) -> Any:
     """Return points, blocks, point data and cell data, nodes renumbered to those of the file."""
-    nodes = np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+    nodes = used_nodes([cells for _, cells in blocks])
     points = node_store(ctx).coords[nodes]
     at_points: dict[str, FloatArray] = {}
     in_cells: dict[str, list[FloatArray]] = {}
@@ -143,7 +143,7 @@ def _data(ctx: Context, content: _Content, blocks: list[tuple[str, IntArray]]) -
             at_points |= _nodal(name, values, nodes)
         else:
             _element(name, values, blocks, nodes, at_points, in_cells)
-    return points, [(name, np.searchsorted(nodes, cells)) for name, cells in blocks], at_points, in_cells
+    return points, [(name, places_in(nodes, cells)) for name, cells in blocks], at_points, in_cells
 
 
 def _nodal(name: str, values: ChPoint, nodes: IntArray) -> dict[str, FloatArray]:

@@ -26,7 +26,7 @@ from gibiane_ops.kernels.plot.scales import short
 from gibiane_ops.kernels.plot.skin import skin
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import moved
-from gibiane_ops.kernels.topology import solids
+from gibiane_ops.kernels.topology import places_in, solids
 from gibiane_ops.output.targets import COLOURS
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.deformee import Shape, Vecteur
@@ -100,7 +100,7 @@ def of_zone(field: MChaml, on: ModelZone, values: FloatArray, n_points: int) -> 
     at_nodes = moved(shape(on.shape), values[..., None], field.support, "NOEUD")
     nodal = np.full(n_points, np.nan)
     used = np.unique(on.cells)
-    local = np.searchsorted(used, on.cells)
+    local = places_in(used, on.cells)
     nodal[used] = nodal_mean(len(used), [local], [at_nodes])[:, 0]
     return Values(nodal=nodal)
 

@@ -10,6 +10,7 @@ from gibiane.registry import Context
 from gibiane_ops.kernels import assembly, geometry, recovery
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
+from gibiane_ops.kernels.topology import places_in, used_nodes
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.exterior import Side, held_at, held_directions
 from gibiane_ops.values.maillage import Point
@@ -37,11 +38,11 @@ def unbalanced(
     `contact` gives nodes and forces that act on them beside the loads; directions that are held keep no force.
     """
     store, dim = node_store(ctx), zones[0].dim
-    nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
+    nodes = used_nodes([z.cells for z in zones])
     points = store.coords[nodes][:, :dim]
     force, scale = np.zeros((len(nodes), dim)), 0.0
     for zone in zones:
-        of, cells = shape(zone.shape), np.searchsorted(nodes, zone.cells)
+        of, cells = shape(zone.shape), places_in(nodes, zone.cells)
         values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
         inner = assembly.internal_forces(of, points[cells], values)
         scale = max(scale, float(np.abs(inner).max(initial=0.0)))

@@ -42,7 +42,7 @@ def pressure_forces(ctx: Context, model: Modele, field: MChaml) -> ChPoint:
         with worded(ctx, at="model"):
             blocks.append((zone.cells, assembly.pressure_load(of, x, nodal, axisymmetric=zone.axisymmetric)))
     nodes = topology.used_nodes([cells for cells, _ in blocks])
-    local = [(np.searchsorted(nodes, cells), forces) for cells, forces in blocks]
+    local = [(topology.places_in(nodes, cells), forces) for cells, forces in blocks]
     dim = zones[0].dim
     total = assembly.assemble_vector(len(nodes), dim, local).reshape(-1, dim)
     return ChPoint.from_table(store, FORCES[zones[0].family], nodes, total, DISCRET)

@@ -12,7 +12,7 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotConverged
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.supports import moved
-from gibiane_ops.kernels.topology import used_nodes
+from gibiane_ops.kernels.topology import places_in, used_nodes
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
@@ -129,7 +129,7 @@ def smoothed(
         for zone in zones:
             of = shape(zone.shape)
             values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
-            blocks.append(StressBlock(of, np.searchsorted(nodes, zone.cells), values))
+            blocks.append(StressBlock(of, places_in(nodes, zone.cells), values))
         if given is None:
             try:
                 if balance is None:
@@ -172,7 +172,7 @@ def _together(
 ) -> list[Solid]:
     """Smooth all the zones as one solid whose paired nodes are one."""
     zones = solid_zones(ctx, model)
-    nodes = np.unique(np.concatenate([z.cells.ravel() for z in zones]))
+    nodes = used_nodes([z.cells for z in zones])
     known = pairs[np.isin(pairs, nodes).all(axis=1)]
     name = np.arange(len(nodes))
     name[np.searchsorted(nodes, known[:, 0])] = np.searchsorted(nodes, known[:, 1])
@@ -181,7 +181,7 @@ def _together(
     blocks = []
     for zone in zones:
         values = moved(shape(zone.shape), on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
-        blocks.append(StressBlock(shape(zone.shape), place[np.searchsorted(nodes, zone.cells)], values))
+        blocks.append(StressBlock(shape(zone.shape), place[places_in(nodes, zone.cells)], values))
     found = recovery.recover(points, blocks, method, degree)
     return [Solid(zones, node_store(ctx).coords[nodes][:, : zones[0].dim], nodes, blocks, found.nodal[place])]
 

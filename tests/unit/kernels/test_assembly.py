@@ -81,6 +81,23 @@ def test_pressure_per_facet() -> None:
     assert forces[:, :, 2] == pytest.approx(np.array([[-1.0] * 3, [-2.0] * 3]))
 
 
+@pytest.mark.parametrize("name", ["TRI3", "QUA4", "TRI6", "QUA8"])
+def test_pressure_on_more_facets_than_one_piece_holds(name: str) -> None:
+    # Each facet gives what it gives alone, wherever the pieces begin and end.
+    of, rng = shape(name), np.random.default_rng(3)
+    m = 16 * geometry.PIECE + 1025
+    X = np.concatenate([of.ref_nodes, np.zeros((of.n_nodes, 1))], axis=1) + 0.1 * rng.standard_normal((m, of.n_nodes, 3))
+    p = rng.uniform(1, 2, (m, of.n_nodes))
+    forces, per_facet = assembly.pressure_load(of, X, p), assembly.pressure_load(of, X, p[:, 0])
+    points, weights = of.mass_gauss
+    for i in (0, 1023, 1024, 16 * geometry.PIECE - 1, 16 * geometry.PIECE, m - 1):
+        tangents = np.einsum("ni,qnd->qid", X[i], of.dN(points))
+        flux = np.cross(tangents[..., 0], tangents[..., 1]) * weights[:, None]
+        N = of.N(points)
+        np.testing.assert_allclose(forces[i], -N.T @ (flux * (N @ p[i])[:, None]), rtol=1e-12, atol=1e-14)
+        np.testing.assert_allclose(per_facet[i], -N.T @ flux * p[i, 0], rtol=1e-12, atol=1e-14)
+
+
 def test_distributed_loads_by_hand() -> None:
     cube = (shape("CUB8").ref_nodes[None] + 1) / 2
     weight = assembly.distributed_load(shape("CUB8"), cube, [0.0, 0, -8])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gibiane_ops.kernels.contact.pairs import facets_of_body, joined, nodal_normals, node_pairs
+from gibiane_ops.kernels.contact.pairs import _distinct, facets_of_body, joined, nodal_normals, node_pairs
 from gibiane_ops.kernels.errors import BadValue, EmptyContact
 
 # two unit squares in one plane, four QUA4 each, nodes 0-8 (slave, normal -z) and 9-17 (master, normal +z)
@@ -109,3 +109,23 @@ def test_a_facet_between_two_cells_is_not_on_the_boundary():
     assert turned.tolist() == [[0, 1], [2, 5]]
     with pytest.raises(EmptyContact, match="1 facets"):
         facets_of_body([("QUA4", cells)], [("SEG2", np.array([[0, 1], [1, 4]]))])
+
+
+def test_a_surface_that_names_one_inner_facet_twice_is_refused():
+    # As many facets as the cells have there, in the same order: only that they are the same one tells them apart.
+    cells = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    with pytest.raises(EmptyContact, match="2 facets"):
+        facets_of_body([("QUA4", cells)], [("SEG2", np.array([[1, 4], [4, 1]]))])
+
+
+def test_equal_keys_are_found_among_many():
+    keys = np.random.default_rng(0).integers(0, 2**64, 5000, dtype=np.uint64)
+    assert _distinct(keys)
+    for at in (0, 17, 4999):
+        twice = np.append(keys, keys[at])
+        assert not _distinct(twice)
+    # all in one slot of the table
+    near = np.arange(300, dtype=np.uint64)
+    assert _distinct(near)
+    near[299] = 4
+    assert not _distinct(near)

@@ -110,3 +110,10 @@ def test_used_nodes():
         9,
     ]
     assert topology.used_nodes([]).tolist() == []
+
+
+def test_places_of_nodes_in_a_list() -> None:
+    nodes = np.array([9, 2, 5, 7])
+    cells = np.array([[2, 5, 9], [7, 9, 2]])
+    assert topology.places_in(nodes, cells).tolist() == [[1, 2, 0], [3, 0, 1]]
+    assert topology.places_in(nodes[:0], cells[:0]).shape == (0, 3)

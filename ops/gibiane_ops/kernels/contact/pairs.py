@@ -486,9 +486,21 @@ def _same_facets(a: IntArray, b: IntArray) -> bool:
             return False
     mixed = (a.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
     mixed = (mixed ^ (mixed >> np.uint64(31))) * np.uint64(0xBF58476D1CE4E5B9)
-    key = functools.reduce(np.add, mixed.T)
-    key.sort()
-    return bool((key[1:] != key[:-1]).all())
+    return _distinct(functools.reduce(np.add, mixed.T))
+
+
+def _distinct(key: NDArray[np.uint64]) -> bool:
+    """Tell whether well mixed keys differ from each other; only those that share a slot of a table are sorted."""
+    bits = (8 * len(key)).bit_length()
+    slot = (key >> np.uint64(64 - bits)).astype(np.int64)
+    last = np.empty(1 << bits, np.int32)
+    number = np.arange(len(key), dtype=np.int32)
+    last[slot] = number
+    winner = last[slot]
+    shared = winner != number
+    shared[winner[shared]] = True
+    doubtful = np.sort(key[shared])
+    return bool((doubtful[1:] != doubtful[:-1]).all())
 
 
 def _facets_on(body: Sequence[Block], name: str, marked: NDArray[np.bool_]) -> IntArray:
@@ -496,8 +508,11 @@ def _facets_on(body: Sequence[Block], name: str, marked: NDArray[np.bool_]) -> I
     found = [np.zeros((0, shape(name).n_nodes), np.int64)]
     corners = shape(name).n_corners
     for of, cells in body:
-        for facet, local in shape(of).faces:
-            if facet == name:
-                on = marked[cells[:, local[:corners]]].all(axis=1)
-                found.append(cells[on][:, list(local)])
+        faces = [local for facet, local in shape(of).faces if facet == name]
+        on_surface = np.ascontiguousarray(marked[cells[:, : shape(of).n_corners]].T)
+        for local in faces:
+            on = functools.reduce(np.logical_and, [on_surface[i] for i in local[:corners]])
+            rows = np.flatnonzero(on)
+            if len(rows):
+                found.append((cells if len(rows) == len(cells) else cells[rows])[:, list(local)])
     return np.concatenate(found)
