@@ -153,7 +153,7 @@ def _times_field(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
     _matrices(ctx, k, "k")
     system = build(ctx, k)
     values = u.table(system.names, system.nodes).ravel()
-    forces = system.K @ values - system.C.T @ u.at("LX", system.multipliers)
+    forces = system.K @ values - system.reactions.T @ u.at("LX", system.multipliers)
     table = forces.reshape(-1, system.dim)
     parts = {name: (system.nodes, table[:, i]) for i, name in enumerate(system.duals)}
     if len(system.multipliers):

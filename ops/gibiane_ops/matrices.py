@@ -197,6 +197,7 @@ def _multipliers(k: Rigidite, unilateral: bool = False) -> IntArray:
 
 def _nodes(k: Rigidite) -> IntArray:
     found = [np.zeros(0, np.int64), *(p.nodes for p in k.matrices), *(c.node for c in k.conditions)]
+    found += [c.reactions.node for c in k.conditions]
     for contact in k.contacts:
         pairs = contact.pairs.pairs.ravel()
         found.append(pairs[pairs >= 0])
@@ -226,7 +227,7 @@ def _nodes_of_matrix(ctx: Context, k: Rigidite, mail: bool, which: str | None) -
 def _names_of_matrix(ctx: Context, k: Rigidite, comp: bool, dual: bool) -> ListMots:
     names = [n for p in k.matrices for n in (p.duals if dual else p.names)]
     for condition in k.conditions:
-        used = [str(n) for n in np.unique(condition.name)]
+        used = [str(n) for n in np.unique(condition.reactions.name if dual else condition.name)]
         names += [dual_of(n) for n in used] if dual else used
     if k.conditions or k.contacts:
         names.append("FLX" if dual else "LX")
@@ -330,11 +331,13 @@ def _renamed(
             parts.append(made)
         elif isinstance(part, ConditionPart):
             name = np.array([table.get(str(n), str(n)) for n in part.name])
-            parts.append(
-                ConditionPart(
-                    part.row, part.node, name, part.coefficients, part.multipliers, part.sense, part.label, part.line
-                )
+            renamed = ConditionPart(
+                part.row, part.node, name, part.coefficients, part.multipliers, part.sense, part.label, part.line
             )
+            if part.own_reactions is not None:
+                own = part.own_reactions
+                renamed.own_reactions = own._replace(name=np.array([table.get(str(n), str(n)) for n in own.name]))
+            parts.append(renamed)
         else:
             parts.append(part)
     return Rigidite(parts)

@@ -20,11 +20,12 @@ from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.conditions import KNOWN, ROTATIONS, displacements, family, rows_of, support
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
-from gibiane_ops.values.modele import Modele
+from gibiane_ops.values.modele import DUALS, Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
-from gibiane_ops.values.rigidite import Rigidite
+from gibiane_ops.values.rigidite import ConditionTerms, Rigidite
 
 SENSES = {"MINI": ">", "MAXI": "<"}
+UNKNOWN_OF = {force: unknown for unknown, force in DUALS.items()}
 
 RELA = operator(
     "RELA",
@@ -34,7 +35,10 @@ RELA = operator(
     "node i of G2 and so on; a mesh of one node, or a point, stands in all relations. A coefficient is 1 if absent; "
     "m is the name of an unknown, or 'DEPL' 'DIRECTION' V ('ROTA' 'DIRECTION' V) for a displacement (rotation) along "
     "a vector. The sum is 0, or the value that DEPI gives; 'MINI': at least, 'MAXI': at most. `RELA CHPO`: one "
-    "relation, whose coefficients are the values of the field. 'ENSE' m G: the unknown m is the same on all of G. "
+    "relation, whose coefficients are the values of the field; with 'DUAL' CHPO2 its reaction is LX times CHPO2 "
+    "(names of forces, or of the unknowns that they go with) in place of LX times CHPO, and the system, no longer "
+    "symmetric, is solved by LU: friction of known direction, say. CHPO2 must work against the relation. "
+    "'ENSE' m G: the unknown m is the same on all of G. "
     "'CORI' 'DEPL' G: G moves as a rigid body. 'MILI' (names) G: nodes in the middle of edges follow the ends. "
     "G1 'ACCRO' G2 (names) (tol): each node of G1 that an element of G2 holds moves with it. G1 'GLISSANT' G2 (tol): "
     "likewise, but free to slide along the line G1. `RELA MODL`: displacements stay continuous where elements of the "
@@ -251,25 +255,32 @@ def _names(ctx: Context, names: ListMots | None) -> list[str]:
 @RELA.form(
     Arg("field", CHPOINT, "coefficients"),
     Key(("MINI", "MAXI"), "at least, at most", name="sense"),
-    Key("DUAL", "reactions of their own", Arg("reactions", CHPOINT)),
+    Key("DUAL", "its reaction, for a multiplier of one", Arg("reactions", CHPOINT)),
     gives=[RIGIDITE],
 )
 def _field(ctx: Context, field: ChPoint, sense: str | None, dual: ChPoint | None) -> Rigidite:
+    terms = _terms_of(ctx, field, "field")
+    centre = node_store(ctx).coords[np.unique(np.concatenate([t[1] for t in terms]))].mean(axis=0)
+    made = rows_of(ctx, centre[None], terms, "RELA CHPOINT", SENSES.get(sense or "", "="))
     if dual is not None:
-        ctx.fail(
-            251,
-            "RELA 'DUAL' is not available yet: it makes the matrix unsymmetric",
-            at="dual",
-            hint="without 'DUAL' the reactions have the direction of the relation",
+        row, node, names, values = zip(*_terms_of(ctx, dual, "dual"), strict=True)
+        name = np.repeat([UNKNOWN_OF.get(n, n) for n in names], [len(r) for r in row])
+        made.conditions[0].own_reactions = ConditionTerms(
+            np.concatenate(row), np.concatenate(node), name, np.concatenate(values)
         )
-    terms: list[Any] = []
+    return made
+
+
+def _terms_of(ctx: Context, field: ChPoint, at: str) -> list[tuple[IntArray, IntArray, str, FloatArray]]:
+    """Return the values of a field, which are not zero, as terms of one relation."""
+    terms = []
     for name, (nodes, values) in field.parts.items():
         used = values != 0
-        terms.append((np.zeros(int(used.sum()), np.int64), nodes[used], name, values[used]))
-    if not sum(len(t[0]) for t in terms):
-        ctx.fail(26, "all coefficients of the relation are zero", at="field")
-    centre = node_store(ctx).coords[np.unique(np.concatenate([t[1] for t in terms]))].mean(axis=0)
-    return rows_of(ctx, centre[None], terms, "RELA CHPOINT", SENSES.get(sense or "", "="))
+        if used.any():
+            terms.append((np.zeros(int(used.sum()), np.int64), nodes[used], name, values[used]))
+    if not terms:
+        ctx.fail(26, "all coefficients of the relation are zero", at=at)
+    return terms
 
 
 @RELA.stream(

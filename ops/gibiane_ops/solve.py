@@ -20,6 +20,7 @@ from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.suites import ListChpo
 from gibiane_ops.values.system import build
+from gibiane_ops.values.unsymmetric import solve_unsymmetric_system
 
 RESO = operator(
     "RESO",
@@ -165,6 +166,9 @@ def _solutions(
     """Solve for every second member."""
     system = build(ctx, k, bilateral=wishes.bonded)
     loads = [system.load(ctx, field, lenient=lenient) for field in fields]
+    if not system.symmetric:
+        stops = np.column_stack([system.stop_values(field) for field in fields])
+        return solve_unsymmetric_system(ctx, system, loads, stops)
     if system.contacts or system.stops.shape[0]:
         return [solve_contact(ctx, k, system, *pair, wishes) for pair in zip(fields, loads, strict=True)]
     return solve_linear(ctx, k, system, loads, prec)
@@ -228,10 +232,11 @@ def _reac(ctx: Context, k: Rigidite, u: ChPoint) -> ChPoint:
     store = node_store(ctx)
     terms: dict[str, list[tuple[Any, Any]]] = {}
     for part in k.conditions:
-        force = part.coefficients * u.at("LX", part.multipliers)[part.row]
-        nodes = store.canonical(part.node)
-        for name in np.unique(part.name):
-            chosen = part.name == name
+        row, node, unknown, factor = part.reactions
+        force = factor * u.at("LX", part.multipliers)[row]
+        nodes = store.canonical(node)
+        for name in np.unique(unknown):
+            chosen = unknown == name
             terms.setdefault(dual_of(str(name)), []).append((nodes[chosen], force[chosen]))
     for contact in k.contacts:
         nodes = np.arange(store.count)

@@ -20,7 +20,7 @@ from gibiane_ops.values.material import on_zone, solid_zones
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.parts import model_part
-from gibiane_ops.values.rigidite import ConditionPart, ContactPart, MatrixPart, Rigidite
+from gibiane_ops.values.rigidite import ConditionPart, ConditionTerms, ContactPart, MatrixPart, Rigidite
 
 RIGI = operator(
     "RIGIDITE",
@@ -98,22 +98,30 @@ def _redu(ctx: Context, k: Rigidite, mesh: Maillage) -> Rigidite:
         parts += _solid(ctx, model, material).parts
     nodes = mesh.nodes
     for condition in k.conditions:
-        outside = np.unique(condition.row[~np.isin(condition.node, nodes)])
+        reactions = condition.reactions
+        outside = np.union1d(
+            condition.row[~np.isin(condition.node, nodes)], reactions.row[~np.isin(reactions.node, nodes)]
+        )
         rows = np.setdiff1d(np.arange(len(condition.multipliers)), outside)
         if len(rows):
             kept = np.isin(condition.row, rows)
-            parts.append(
-                ConditionPart(
-                    np.searchsorted(rows, condition.row[kept]),
-                    condition.node[kept],
-                    condition.name[kept],
-                    condition.coefficients[kept],
-                    condition.multipliers[rows],
-                    condition.sense,
-                    condition.label,
-                    condition.line,
-                )
+            reduced = ConditionPart(
+                np.searchsorted(rows, condition.row[kept]),
+                condition.node[kept],
+                condition.name[kept],
+                condition.coefficients[kept],
+                condition.multipliers[rows],
+                condition.sense,
+                condition.label,
+                condition.line,
             )
+            if condition.own_reactions is not None:
+                kept = np.isin(reactions.row, rows)
+                row = np.searchsorted(rows, reactions.row[kept])
+                reduced.own_reactions = ConditionTerms(
+                    row, reactions.node[kept], reactions.name[kept], reactions.coefficients[kept]
+                )
+            parts.append(reduced)
     return Rigidite(parts)
 
 

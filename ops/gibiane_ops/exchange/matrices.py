@@ -26,7 +26,7 @@ def _matrix(ctx: Context, mat: bool, market: bool, whole: bool, k: Rigidite) -> 
     system = build(ctx, k, bilateral=True)
     matrix = system.K
     if system.C.shape[0]:
-        matrix = sp.block_array([[system.K, system.C.T], [system.C, None]], format="csr")
+        matrix = sp.block_array([[system.K, system.reactions.T], [system.C, None]], format="csr")
     path = output_path(ctx, ".mtx")
     order = " ".join(system.names)
     comment = (

@@ -146,15 +146,16 @@ def held_directions(
     nodes, matrices = [np.zeros(0, np.int64)], [np.zeros((0, dim, dim))]
     place = {name: i for i, name in enumerate(names)}
     for part in supports.conditions if supports is not None else []:
-        if part.sense != "=" or not len(part.row):
+        row, node, unknown, factor = part.reactions
+        if part.sense != "=" or not len(row):
             continue
-        count, node = len(part.multipliers), store.canonical(part.node)
-        column = np.array([place.get(str(name), -1) for name in part.name])
+        count, node = len(part.multipliers), store.canonical(node)
+        column = np.array([place.get(str(name), -1) for name in unknown])
         low, high = np.full(count, store.count), np.full(count, -1)
-        np.minimum.at(low, part.row, np.where(column >= 0, node, -1))
-        np.maximum.at(high, part.row, node)
+        np.minimum.at(low, row, np.where(column >= 0, node, -1))
+        np.maximum.at(high, row, node)
         vector = np.zeros((count, dim))
-        np.add.at(vector, (part.row, column), np.where(column >= 0, part.coefficients, 0.0))
+        np.add.at(vector, (row, column), np.where(column >= 0, factor, 0.0))
         length = (vector**2).sum(axis=1)
         own = (low == high) & (length > 0)
         nodes.append(low[own])

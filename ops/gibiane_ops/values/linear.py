@@ -15,7 +15,6 @@ from gibiane_ops.kernels.constraints import Reduction, reduce_conditions
 from gibiane_ops.kernels.packages import DIRECT, is_installed
 from gibiane_ops.kernels.rigid import rigid_modes
 from gibiane_ops.kernels.solve import Factor, factorize
-from gibiane_ops.kernels.unsymmetric import solve_unsymmetric
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.nodes import FloatArray, IntArray
 from gibiane_ops.values.rigidite import Rigidite
@@ -25,6 +24,8 @@ from gibiane_ops.values.system import System
 ENERGY_LIMIT = 1e-6
 """Share of the energy that may be missing in ``u.K.u = u.(F + r)`` before a warning is due."""
 ROUND_OFF = 1e-13
+SHOWN = 6
+"""Conditions of one instruction that a message names."""
 
 METHODS = {
     "single": "sparse LDLt in single precision (rslab), corrected to double",
@@ -51,7 +52,7 @@ def reduced(ctx: Context, system: System, imposed: FloatArray) -> Reduction:
             at="k",
             where=_place(system, int(failure.rows[-1])),
             gap=f"{failure.residual:.3g}",
-            conditions=", ".join(_origins(system, failure.rows)),
+            conditions=_written(system, failure.rows, imposed),
             hint="they prescribe different values of the same unknowns: leave one out, or give both the same DEPI",
         )
     if len(reduction.redundant) and ctx.option("ECHO") >= 1:
@@ -65,6 +66,20 @@ def _origins(system: System, rows: IntArray) -> list[str]:
     wanted = system.multipliers[rows]
     found = [c for c in system.conditions if np.isin(wanted, c.multipliers).any()]
     return list(dict.fromkeys(c.origin for c in found))
+
+
+def _written(system: System, rows: IntArray, imposed: FloatArray) -> str:
+    """Return what the user wrote for some rows with the values imposed, those of one instruction together."""
+    values = imposed.reshape(len(system.multipliers), -1)
+    by_line: dict[int, list[str]] = {}
+    for row in rows.tolist():
+        part = next(c for c in system.conditions if system.multipliers[row] in c.multipliers)
+        # several second members: which of them contradicts the others is not known here
+        value = f" = {values[row, 0]:.6g}" if values.shape[1] == 1 else ""
+        texts = by_line.setdefault(part.line, [])
+        if part.label + value not in texts:
+            texts.append(part.label + value)
+    return "; ".join(", ".join(texts[:SHOWN]) + (f" (line {line})" if line else "") for line, texts in by_line.items())
 
 
 def _place(system: System, row: int) -> str:
@@ -115,8 +130,6 @@ def solve_linear(
     """Solve for several second members with one factorisation, kept for the next call with the same matrix."""
     F = np.column_stack([force for force, _ in loads])
     reduction = reduced(ctx, system, np.column_stack([values for _, values in loads]))
-    if not system.symmetric:
-        return _unsymmetric(ctx, system, reduction, F)
     wish = solver_wish(ctx)
     definite = bool((system.K.diagonal()[reduction.free] > 0).all())
     space = int(ctx.option("DIME"))
@@ -153,17 +166,6 @@ def solve_linear(
     _check_energy(ctx, system, u, F, r)
     m = reduction.multipliers(r)
     return [system.field(u[:, i], m[:, i]) for i in range(count)]
-
-
-def _unsymmetric(ctx: Context, system: System, reduction: Reduction, F: FloatArray) -> list[ChPoint]:
-    """Solve with a matrix without symmetry (MANU 'RIGI' 'QUEL')."""
-    try:
-        v = solve_unsymmetric(reduction.matrix(system.K), reduction.load(system.K, F))
-    except k_errors.SingularSystem as failure:
-        singular(ctx, system, failure, reduction.free)
-    u = reduction.expand(v)
-    m = reduction.multipliers(reduction.reactions(system.K, u, F))
-    return [system.field(u[:, i], m[:, i]) for i in range(F.shape[1])]
 
 
 def _bytes(size: float) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gibiane.registry import Context
 from gibiane_ops.kernels import assembly, topology
 from gibiane_ops.kernels.elements.table import shape

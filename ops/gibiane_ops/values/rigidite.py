@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -43,6 +43,15 @@ class MatrixPart:
         self.mesh = mesh
 
 
+class ConditionTerms(NamedTuple):
+    """Rows, nodes, unknowns and factors of a few conditions, (k,) each."""
+
+    row: IntArray
+    node: IntArray
+    name: Any
+    coefficients: FloatArray
+
+
 class ConditionPart:
     """Linear conditions, one row each: sum of `coefficients` times unknowns `=`, `<` or `>` a value.
 
@@ -61,7 +70,12 @@ class ConditionPart:
         What the user wrote, for messages (BLOQ UX).
     line : int
         Line of the instruction that made them, 0 when unknown.
+    reactions : ConditionTerms
+        Where the multipliers act: row, node, unknown and factor, like the terms of the conditions; these themselves
+        unless RELA 'DUAL' gave others, which makes the system unsymmetric.
     """
+
+    own_reactions: ConditionTerms | None = None
 
     def __init__(
         self,
@@ -82,6 +96,16 @@ class ConditionPart:
         self.sense = sense
         self.label = label
         self.line = line
+
+    @property
+    def reactions(self) -> ConditionTerms:
+        """The terms that the multipliers act on."""
+        return self.own_reactions or self.terms
+
+    @property
+    def terms(self) -> ConditionTerms:
+        """The terms of the conditions."""
+        return ConditionTerms(self.row, self.node, self.name, self.coefficients)
 
     @property
     def origin(self) -> str:

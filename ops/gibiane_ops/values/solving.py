@@ -68,7 +68,9 @@ def _same(a: Any, b: Any) -> bool:
         )
     if isinstance(a, ConditionPart) and isinstance(b, ConditionPart):
         arrays = ("row", "node", "name", "coefficients")
-        return a.sense == b.sense and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in arrays)
+        pairs = [(getattr(a, name), getattr(b, name)) for name in arrays]
+        pairs += zip(a.reactions, b.reactions, strict=True)
+        return a.sense == b.sense and all(np.array_equal(one, two) for one, two in pairs)
     return False
 
 

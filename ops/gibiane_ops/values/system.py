@@ -13,7 +13,7 @@ from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, no_pairs
 from gibiane_ops.kernels.topology import used_nodes
 from gibiane_ops.values.champs import DIFFUS, ChPoint
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore, node_store
-from gibiane_ops.values.rigidite import ConditionPart, ContactPart, Rigidite
+from gibiane_ops.values.rigidite import ConditionPart, ConditionTerms, ContactPart, Rigidite
 
 ROTATIONS = {"RX", "RY", "RZ", "RT"}
 
@@ -39,8 +39,11 @@ class System:
     stop_multipliers : (k,) int64
     stop_signs : (k,) float64
         1 for MAXI, -1 for MINI: the rows, and the values of the load, are multiplied by it.
+    reactions, stop_reactions : csr_array
+        Where the multipliers of C and of the stops act: ``K u = F + reactions.T m``. These rows themselves unless
+        RELA 'DUAL' gave others.
     symmetric : bool
-        Whether K is.
+        Whether K is, and the conditions act along themselves.
     """
 
     store: NodeStore
@@ -55,6 +58,8 @@ class System:
     stops: sp.csr_array
     stop_multipliers: IntArray
     stop_signs: FloatArray
+    reactions: sp.csr_array
+    stop_reactions: sp.csr_array
     symmetric: bool = True
 
     @property
@@ -183,61 +188,22 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
         whole = len(place) == size and bool((np.diff(place) == 1).all())
         matrix = part.matrix if whole else _renumbered(part.matrix, place, size)
         K = K + matrix if number else matrix
-    rows, cols, data, multipliers, signs = [], [], [], [], []
-    start = 0
     conditions = _applicable(ctx, rigidity.conditions, names)
-    for condition in conditions:
-        ids = store.canonical(condition.node)
-        place = np.minimum(np.searchsorted(nodes, ids), len(nodes) - 1)
-        lost = nodes[place] != ids
-        if lost.any():
-            where = " ".join(f"{x:g}" for x in store.coords[ids[lost][0]])
-            ctx.fail(
-                53,
-                "{which}: {count} of its nodes have no stiffness, the first at ({where})",
-                at="k",
-                which=condition.origin,
-                count=int(lost.sum()),
-                where=where,
-            )
-        unknown = [str(n) for n in np.unique(condition.name) if str(n) not in names]
-        if unknown:
-            ctx.fail(
-                197,
-                "{which}: the matrix has no unknown {name}; it has {known}",
-                at="k",
-                which=condition.origin,
-                name=unknown[0],
-                known=" ".join(names),
-            )
-        ordered = sorted(names)
-        column = np.array([names.index(n) for n in ordered])[np.searchsorted(ordered, condition.name)]
-        rows.append(condition.row + start)
-        cols.append(place * len(names) + column)
-        data.append(condition.coefficients)
-        multipliers.append(condition.multipliers)
-        turned = 0.0 if bilateral else {"=": 0.0, "<": 1.0, ">": -1.0}[condition.sense]
-        signs.append(np.full(len(condition.multipliers), turned))
-        start += len(condition.multipliers)
-    empty_ids = np.zeros(0, np.int64)
-    C = sp.csr_array(
-        (
-            np.concatenate([np.zeros(0), *data]),
-            (np.concatenate([empty_ids, *rows]), np.concatenate([empty_ids, *cols])),
-        ),
-        shape=(start, size),
-    )
-    sign = np.concatenate([np.zeros(0), *signs])
+    numbering = _Numbering(ctx, store, nodes, names)
+    C = numbering.matrix(conditions, [c.terms for c in conditions])
     symmetric = all(part.symmetric for part in rigidity.matrices)
-    if not symmetric and (rigidity.contacts or sign.any()):
-        ctx.fail(
-            251,
-            "contact and unilateral conditions want a symmetric matrix",
-            at="k",
-            hint="'NOUN' makes equalities of unilateral conditions",
-        )
-    carriers = np.concatenate([empty_ids, *multipliers])
+    reactions = C
+    if any(c.own_reactions is not None for c in conditions):
+        symmetric = False
+        reactions = numbering.matrix(conditions, [c.reactions for c in conditions])
+    turns = {"=": 0.0, "<": 1.0, ">": -1.0}
+    signs = [np.full(len(c.multipliers), 0.0 if bilateral else turns[c.sense]) for c in conditions]
+    sign = np.concatenate([np.zeros(0), *signs])
+    if not symmetric and rigidity.contacts:
+        ctx.fail(251, "contact wants a symmetric matrix", at="k")
+    carriers = np.concatenate([np.zeros(0, np.int64), *(c.multipliers for c in conditions)])
     equal, stop = np.flatnonzero(sign == 0), np.flatnonzero(sign)
+    turned = sp.diags_array(sign[stop])
     return System(
         store,
         nodes,
@@ -248,11 +214,64 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
         conditions,
         rigidity.contacts,
         carriers[equal],
-        sp.csr_array(sp.diags_array(sign[stop]) @ C[stop]) if len(stop) else C[stop],
+        sp.csr_array(turned @ C[stop]) if len(stop) else C[stop],
         carriers[stop],
         sign[stop],
+        reactions[equal],
+        sp.csr_array(turned @ reactions[stop]) if len(stop) else C[stop],
         symmetric,
     )
+
+
+@dataclass(eq=False)
+class _Numbering:
+    """The numbers of the unknowns of a system, to write conditions with."""
+
+    ctx: Context
+    store: NodeStore
+    nodes: IntArray
+    names: tuple[str, ...]
+
+    def matrix(self, conditions: list[ConditionPart], terms: list[ConditionTerms]) -> sp.csr_array:
+        """Return the terms of some conditions as rows, one after the other."""
+        rows, cols, data = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+        start = 0
+        for condition, each in zip(conditions, terms, strict=True):
+            rows.append(each.row + start)
+            cols.append(self._columns(condition, each))
+            data.append(each.coefficients)
+            start += len(condition.multipliers)
+        place = (np.concatenate(rows), np.concatenate(cols))
+        return sp.csr_array((np.concatenate(data), place), shape=(start, len(self.nodes) * len(self.names)))
+
+    def _columns(self, condition: ConditionPart, terms: ConditionTerms) -> IntArray:
+        """Return the numbers of the unknowns of terms; a node or an unknown that the matrix has not is an error."""
+        ids = self.store.canonical(terms.node)
+        place = np.minimum(np.searchsorted(self.nodes, ids), len(self.nodes) - 1)
+        lost = self.nodes[place] != ids
+        if lost.any():
+            where = " ".join(f"{x:g}" for x in self.store.coords[ids[lost][0]])
+            self.ctx.fail(
+                53,
+                "{which}: {count} of its nodes have no stiffness, the first at ({where})",
+                at="k",
+                which=condition.origin,
+                count=int(lost.sum()),
+                where=where,
+            )
+        unknown = [str(n) for n in np.unique(terms.name) if str(n) not in self.names]
+        if unknown:
+            self.ctx.fail(
+                197,
+                "{which}: the matrix has no unknown {name}; it has {known}",
+                at="k",
+                which=condition.origin,
+                name=unknown[0],
+                known=" ".join(self.names),
+            )
+        ordered = sorted(self.names)
+        column = np.array([self.names.index(n) for n in ordered])[np.searchsorted(ordered, terms.name)]
+        return np.asarray(place * len(self.names) + column, np.int64)
 
 
 def _applicable(ctx: Context, conditions: list[ConditionPart], names: tuple[str, ...]) -> list[ConditionPart]:

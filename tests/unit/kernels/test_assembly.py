@@ -86,7 +86,9 @@ def test_pressure_on_more_facets_than_one_piece_holds(name: str) -> None:
     # Each facet gives what it gives alone, wherever the pieces begin and end.
     of, rng = shape(name), np.random.default_rng(3)
     m = 16 * geometry.PIECE + 1025
-    X = np.concatenate([of.ref_nodes, np.zeros((of.n_nodes, 1))], axis=1) + 0.1 * rng.standard_normal((m, of.n_nodes, 3))
+    X = np.concatenate([of.ref_nodes, np.zeros((of.n_nodes, 1))], axis=1) + 0.1 * rng.standard_normal(
+        (m, of.n_nodes, 3)
+    )
     p = rng.uniform(1, 2, (m, of.n_nodes))
     forces, per_facet = assembly.pressure_load(of, X, p), assembly.pressure_load(of, X, p[:, 0])
     points, weights = of.mass_gauss
