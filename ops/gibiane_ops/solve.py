@@ -70,11 +70,13 @@ RESO = operator(
     "when all of them are below 1.E-5), ECART for PENA, PERT and STATUT (differences of displacement and of force "
     "from 'NEWT', relative), SOLVEUR (estimate of what the iterations, or an approximate law, have left: the energy "
     "norm of the difference from the exact solution on this mesh, by Newton steps from the result, in the unit of "
-    "'ABSOLUE' of ERRE), DISSIPATION, KREF, ZONES (STATUTS and RESULTANTE of each), UNIQUE and AUTRES (statuses "
+    "'ABSOLUE' of ERRE), in the units of the model DISSIPATION, PENEMAX (largest penetration), CONEMAX (force outside "
+    "the cone), JEUMAX (opening), GLISMAX (slip), FORCEMAX (force of a pair), KREF, "
+    "ZONES (STATUTS and RESULTANTE of each), UNIQUE and AUTRES (statuses "
     "of the other solutions) with 'UNIQ', CONDITION with 'NCON' (of the matrix of the method: whole model for PENA "
     "and UZAW, interface for the others), HISTOIRE (RESIDU, CHANGEMENTS of status), MESSAGE. 'SOUC' turns a failure "
     "to converge into a warning and gives the best iterate; with 'RAPP' the table says it (CONVERGE, MESSAGE) in "
-    "place of the warning.",
+    "place of the warning. `CONTRAPP T ;` writes the table in words.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROI 2 (0 0) (1 0)) TRAN 2 (0 1) ;\n"
     "MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.1E11 'NU' 0.3 ;\n"
     "CL = BLOQ 'DEPL' (S POIN 'DROI' (0 0) (1 0) 1.E-6) ;\n"

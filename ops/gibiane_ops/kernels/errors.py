@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -136,16 +137,18 @@ class NotConverged(KernelError):
     best : object
         The best iterate, so that the caller may accept, retry or report.
     reason : str
-        What stopped the iteration, when it is not their number.
+        What stopped the iteration, when it is not their number; names of ``fields`` stand between braces.
+    fields : mapping of str to object
     """
 
     history: list[float]
     best: object = None
     reason: str = ""
+    fields: Mapping[str, object] = field(default_factory=dict)
 
     def __str__(self) -> str:
         last = f", last residual {self.history[-1]:g}" if self.history else ""
-        last += f", {self.reason}" if self.reason else ""
+        last += f", {self.reason.format(**self.fields)}" if self.reason else ""
         return f"no convergence after {len(self.history)} iterations{last}"
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NoReturn
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from gibiane.diagnostics import Text
 from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import errors as k_errors
@@ -26,21 +26,12 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.geometry import facet_normals
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.contact_run import Prepared, run_on_bodies, way_of
+from gibiane_ops.values.contact_words import counted, departures, fail_contact, listed, reason_of, stopped, success
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.linear import solver_wish
 from gibiane_ops.values.methods import Method
 from gibiane_ops.values.nodes import FloatArray, IntArray
-from gibiane_ops.values.rapport import (
-    TOLD,
-    counted,
-    departures,
-    fill_report,
-    stopped,
-    success,
-    tell_distance,
-    tell_others,
-    tell_solver_error,
-)
+from gibiane_ops.values.rapport import TOLD, fill_report, tell_distance, tell_others, tell_solver_error
 from gibiane_ops.values.rigidite import Rigidite
 from gibiane_ops.values.solving import ELASTIC, check_held, kept, tell_notes
 from gibiane_ops.values.system import System
@@ -232,7 +223,7 @@ def _run(
     origin: FloatArray | None,
 ) -> Corrected:
     """Run the method, look for other solutions if asked, and fill the report."""
-    method, converged, message = wishes.method, True, ""
+    method, converged, message = wishes.method, True, Text("")
     try:
         if wishes.bonded:
             found = solve_stuck(prepared.bodies, tied, gap)
@@ -252,16 +243,25 @@ def _run(
         if not isinstance(best, ContactState):
             raise
         found, converged = as_found(prepared.bodies, tied, gap, best), False
-        message = _reason(failure, found.interface)
+        message = reason_of(failure, found.interface)
         if not wishes.lenient:
             if wishes.report is not None:
-                _report(wishes.report, system, method, found.interface, best, converged, message)
-            _fail(ctx, failure, message, method)
+                _report(
+                    wishes.report, system, method, found.interface, best, converged, message.render(ctx.session.lang)
+                )
+            fail_contact(ctx, failure, message, method)
         if wishes.report is None:
-            ctx.warn(1119, "contact has not converged: {reason}", reason=message, at="k")
+            ctx.warn(
+                1119,
+                "contact has not converged by '{method}', the best iterate is returned: {reason}",
+                at="k",
+                method=method.title,
+                reason=message,
+                hint="it obeys no law to the tolerance; 'RAPP' T keeps the history",
+            )
     interface, state = found.interface, found.state
     if wishes.report is not None:
-        _report(wishes.report, system, method, interface, state, converged, message)
+        _report(wishes.report, system, method, interface, state, converged, message.render(ctx.session.lang))
         if not wishes.bonded:
             tell_solver_error(wishes.report, found, origin)
         if method.approximate and not wishes.bonded:
@@ -291,7 +291,7 @@ def _run(
                 "{others}, with forces that differ by {share} of the largest",
                 at="k",
                 here=counted(state),
-                others=" / ".join(dict.fromkeys(counted(other) for other in others.others)),
+                others=listed([counted(other) for other in others.others], " / "),
                 share=f"{others.difference:.2g}",
                 hint="large friction coefficients allow several equilibria; the one returned is that of the method",
             )
@@ -442,60 +442,3 @@ def _with_contact_forces(
         np.concatenate([values, state.r[: len(normal), 0], vector.ravel(), system.stop_signs * on_stops]),
     )
     return ChPoint(system.store, parts, u.nature)
-
-
-def _reason(failure: Any, interface: Interface) -> str:
-    """Say why a method has failed, in terms of the model."""
-    if isinstance(failure, k_errors.ContactUnbalanced):
-        # a slide of the polar cone comes with an opening, which is no physical one
-        along_surface = np.r_[0.0, np.ones(interface.dim - 1)]
-        motion = failure.motion * along_surface if failure.kind == "sliding" else failure.motion
-        mean = interface.to_global(motion).mean(axis=0)
-        size = float(np.abs(mean).max())
-        along = " ".join(f"{x:.2g}" for x in np.round(mean / size, 3) + 0.0) if size > 0 else ""
-        where = f" towards ({along})" if along and failure.kind != "tipping" else ""
-        return f"{failure.share:.2%} of the load on the free motions is not balanced, {failure.kind}{where}"
-    if isinstance(failure, k_errors.StatusCycle):
-        return f"the statuses of {len(failure.pairs)} pairs come back every {failure.period} iterations"
-    last = ", ".join(f"{x:.2g}" for x in failure.history[-3:])
-    why = f", {failure.reason}" if failure.reason else ""
-    return f"{len(failure.history)} iterations, last residuals {last}{why}"
-
-
-def _fail(ctx: Context, failure: Any, reason: str, method: Method) -> NoReturn:
-    if isinstance(failure, k_errors.ContactUnbalanced):
-        if failure.kind == "separation":
-            ctx.fail(
-                "G404",
-                "a solid is held only by contact that opens: {reason}",
-                at="k",
-                reason=reason,
-                hint="hold the solid, or reverse the load that lifts it",
-            )
-        ctx.fail(
-            "G405",
-            "contact cannot balance the load: {reason}",
-            at="k",
-            reason=reason,
-            hint="reduce the tangential load, raise MU, or hold the solid",
-        )
-    if isinstance(failure, k_errors.StatusCycle):
-        ctx.fail(
-            "G406",
-            "method '{method}' cycles: {reason}",
-            at="k",
-            method=method.title,
-            reason=reason,
-            hint="use the default method 'NEWT'",
-        )
-    ctx.fail(
-        1119,
-        "contact has not converged by '{method}': {reason}",
-        at="k",
-        method=method.title,
-        reason=reason,
-        hint="'RAPP' T keeps the history, 'SOUC' gives the best iterate"
-        if method.is_newton
-        else "the default method 'NEWT' needs no parameter; 'RAPP' T keeps the history, "
-        "'ITMA' n allows more iterations",
-    )

@@ -15,7 +15,7 @@ from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState
 from gibiane_ops.kernels.contact.solver_error import solver_error
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
 from gibiane_ops.values.listes import ListEnti, ListReel
-from gibiane_ops.values.methods import OWN_LAW, Method
+from gibiane_ops.values.methods import Method
 from gibiane_ops.values.nodes import FloatArray
 
 TOLD = 1e-2
@@ -54,44 +54,17 @@ def fill_report(
         "EQUILIBRE": float(report.balance),
         "EXACT": bool(converged and report.worst <= max(DEPARTURE, 100 * (method.tolerance or 0.0))),
         "DISSIPATION": float(report.dissipation),
+        "PENEMAX": float(report.deepest),
+        "CONEMAX": float(report.outside),
+        "JEUMAX": float(report.opening),
+        "GLISMAX": float(report.slip),
+        "FORCEMAX": float(report.force),
         "KREF": float(interface.kref),
         "ZONES": _zones(interface, state, zones),
         "HISTOIRE": history,
         "MESSAGE": message,
     }.items():
         table.set(index, value)
-
-
-def success(method: Method, state: ContactState) -> str:
-    """Say what a converged method has converged to."""
-    if method.name in OWN_LAW:
-        return f"converged to the law of the penalty r = {method.r:g}, not to the exact one: {departures(state)}"
-    if method.name == "STATUT":
-        return f"converged by its own criterion, not to the exact law: {departures(state)}"
-    return "converged"
-
-
-def stopped(left: float, enough: float) -> str:
-    """Say that the corrections of a contact solution stopped early because the user asked for it."""
-    return f"stopped early by 'ARRE': the error left is about {left:.2g}, below {enough:.2g} (energy norm)"
-
-
-def departures(state: ContactState) -> str:
-    """Word the departures of a state from the exact laws."""
-    report = state.report
-    parts = {
-        "penetration": report.penetration,
-        "slip inside the cone": report.inner_slip,
-        "force outside the cone": max(report.excess_friction, report.tension),
-        "power": max(report.adhesion_power, abs(report.friction_power)),
-    }
-    return ", ".join(f"{name} {value:.2g}" for name, value in parts.items() if value > 1e-3 * report.worst) or "none"
-
-
-def counted(state: ContactState) -> str:
-    """Word the statuses of a state."""
-    report = state.report
-    return f"{report.n_open} open, {report.n_stick} stick, {report.n_slip} slip"
 
 
 def tell_others(table: Table, others: Sequence[ContactState]) -> None:

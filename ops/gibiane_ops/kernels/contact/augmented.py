@@ -153,8 +153,8 @@ def solve_uzawa(
         if converged or not found.converged:
             converged = converged and found.converged
             if not found.converged:
-                reason = f"the penalty problem of pass {len(history)} is not solved in {len(inner)} steps"
+                reason = "the penalty problem of pass {number} is not solved in {steps} steps"
             break
     status = exact.project(exact.augmented(*now))[1]
     state = physical_state(interface, law, problem, *now, status, history, slip_origin)
-    return finished(interface, state, converged, reason)
+    return finished(interface, state, converged, reason, number=len(history), steps=len(inner))

@@ -52,7 +52,9 @@ def physical_state(
     return check_state(interface, w, r * problem.force, status, law, history, slip_origin, bonded=problem.bonded)
 
 
-def finished(interface: Interface, state: ContactState, converged: bool, reason: str = "") -> ContactState:
+def finished(
+    interface: Interface, state: ContactState, converged: bool, reason: str = "", **fields: object
+) -> ContactState:
     """Return a converged state; otherwise raise the error that explains the failure.
 
     Parameters
@@ -61,7 +63,7 @@ def finished(interface: Interface, state: ContactState, converged: bool, reason:
     state : ContactState
     converged : bool
     reason : str
-        What stopped the method.
+        What stopped the method, with the names of `fields` between braces.
 
     Returns
     -------
@@ -76,7 +78,7 @@ def finished(interface: Interface, state: ContactState, converged: bool, reason:
     """
     if not converged:
         raise_if_unbalanced(interface, state)
-        raise NotConverged(state.history, state, reason)
+        raise NotConverged(state.history, state, reason, fields)
     return state
 
 
@@ -100,5 +102,5 @@ def accepted(state: ContactState, tolerance: float | None) -> ContactState:
         When a departure exceeds ``DEPARTURE``, or a hundred times the tolerance if this is more.
     """
     if not state.report.worst <= max(DEPARTURE, 100 * (tolerance or 0.0)):
-        raise NotConverged(state.history, state, f"the laws are broken by {state.report.worst:.2g}")
+        raise NotConverged(state.history, state, "the laws are broken by {size}", {"size": f"{state.report.worst:.2g}"})
     return state

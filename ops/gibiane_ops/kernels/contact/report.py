@@ -20,7 +20,7 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ContactReport:
-    """Departures of a state from equilibrium and from the laws; all but the counts are relative.
+    """Departures of a state from equilibrium and from the laws, relative, and its largest values, in the model's units.
 
     Attributes
     ----------
@@ -40,6 +40,10 @@ class ContactReport:
         Largest residual of ``S w = f + r`` over the largest force.
     dissipation : float, energy
         ``sum -r_t . w_t``.
+    deepest, outside : float, length and force
+        Penetration and excess of friction again, not divided.
+    opening, slip, force : float, length, length and force
+        Largest of the pairs.
     n_open, n_stick, n_slip : int
     """
 
@@ -51,6 +55,11 @@ class ContactReport:
     friction_power: float
     balance: float
     dissipation: float
+    deepest: float
+    outside: float
+    opening: float
+    slip: float
+    force: float
     n_open: int
     n_stick: int
     n_slip: int
@@ -144,15 +153,22 @@ def check_state(
     holds = interface.active[:, 0]
     spare = np.where(limited, finite - norms(r[:, 1:]), np.inf)
     spare = np.clip(spare / np.maximum(finite, 1e-6 * force), 0.0, 1.0)
+    deepest = float((-apart[holds]).max(initial=0)) + 0.0
+    outside = float((norms(r[:, 1:]) - bound)[limited].max(initial=0))
     report = ContactReport(
-        penetration=float((-apart[holds]).max(initial=0)) / length,
+        penetration=deepest / length,
         tension=float((r[:, 0] - allowed).max(initial=0)) / force,
-        excess_friction=float((norms(r[:, 1:]) - bound)[limited].max(initial=0)) / friction,
+        excess_friction=outside / friction,
         inner_slip=float((spare * norms(slip))[holds & law.rubs & (law.exponent == 0)].max(initial=0)) / length,
         adhesion_power=float(np.abs(r[holds, 0] * opening[holds]).sum()) / (force * length),
         friction_power=float((finite * norms(slip) + power)[limited].sum()) / (force * length),
         balance=float(np.abs(equilibrium).max(initial=0)) / force,
         dissipation=float(-power.sum()),
+        deepest=deepest,
+        outside=max(outside, float((r[:, 0] - allowed).max(initial=0))),
+        opening=float(opening[holds & ~bonded].max(initial=0)),
+        slip=float(norms(slip)[status != OPEN].max(initial=0)),
+        force=float(norms(r).max(initial=0)),
         n_open=int((status == OPEN).sum()),
         n_stick=int((status == STICK).sum()),
         n_slip=int((status == SLIP).sum()),
