@@ -25,7 +25,7 @@ def energy(scene, state):
 
 
 def slow_if(case):
-    slow = case.startswith(("T1_3", "T4_8"))
+    slow = case.startswith(("T1_3", "T2_2", "T3_2", "T4_8"))
     return pytest.param(case, marks=pytest.mark.slow) if slow else case
 
 

@@ -66,6 +66,10 @@ MO = MODE (TB.'SOLIDES') 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ;
 MA = MATE MO 'YOUN' 210000. 'NU' 0.3 ;
 CL = BLOQ 'DEPL' (TB.'BASE') ;
 F1 = PRES 'MASS' MO 3.125 (TB.'SOMMET') ;
+SI MOITIE ;
+  X = COOR 1 (TB.'SOMMET') ;
+  F1 = PRES 'MASS' MO 3.125 ((TB.'SOMMET') ELEM 'APPU' 'STRI' (X POIN 'EGSUPE' -1.E-6)) ;
+FINSI ;
 MC = MODE (TB.'DESSUS') (TB.'DESSOUS') 'CONTACT' 'FROTTANT' 'COULOMB' ;
 MATC = MATE MC 'MU' MU ;
 RC JC = RIGI MC MATC ;
@@ -76,19 +80,27 @@ RB = REAC CL U ;
 """
 
 
-@pytest.mark.parametrize("case", [
-    "T1_1:0.2", "T1_1:0.5", "T1_2:0.2", "T1_2:0.5",
-    pytest.param("T1_3:0.2", marks=pytest.mark.slow), pytest.param("T4_8:0.2", marks=pytest.mark.slow),
-])  # fmt: skip
+QUICK = ("T1_1", "T1_1h", "T2_1", "T2_1h", "T3_1h", "T4_4", "T4_4h")
+SIDES = {"T1": 50.0, "T2": 100.0, "T3": 150.0, "T4": 200.0}
+
+
+@pytest.mark.parametrize(
+    "case",
+    [
+        case if case.startswith(QUICK + ("T1_2:0.2",)) else pytest.param(case, marks=pytest.mark.slow)
+        for case in ORACLES
+    ],
+)
 def test_script_agrees_with_the_independent_solution(case: str) -> None:
     name, mu = case.split(":")
     kind, number = name.split("_")
-    side = {"T1": 50.0, "T4": 200.0}[kind]
-    # T1_n has elements of 25/n mm; T4_m has m elements a side: 200/m = 25/n
-    n = int(number) if kind == "T1" else int(number) // 8
+    side, half_loaded = SIDES[kind], number.endswith("h")
+    count = float(number.rstrip("h"))
+    # T1_n to T3_n have elements of 25/n mm; T4_m has m elements a side: 200/m = 25/n
+    n = count / 8 if kind == "T4" else count
     out = io.StringIO()
     session = Session(out=out, err=out)
-    session.globals.names.update({"COTE": side, "N": n, "MU": float(mu)})
+    session.globals.names.update({"COTE": side, "N": n, "MU": float(mu), "MOITIE": half_loaded})
     assert session.run_text(CALCULATION) == 0, out.getvalue()
     names = session.globals.names
     u, rea, store = names["U"], names["REA"], names["U"].store
