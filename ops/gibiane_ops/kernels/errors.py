@@ -137,8 +137,10 @@ class NotConverged(KernelError):
     best : object
         The best iterate, so that the caller may accept, retry or report.
     reason : str
-        What stopped the iteration, when it is not their number; names of ``fields`` stand between braces.
+        What stopped the iteration, when it is not their number: ``wavering`` (``count`` statuses change back and
+        forth), ``laws`` (broken by ``size``) or ``inner`` (problem ``number`` is not solved in ``steps``).
     fields : mapping of str to object
+        The numbers of the reason.
     """
 
     history: list[float]
@@ -148,7 +150,7 @@ class NotConverged(KernelError):
 
     def __str__(self) -> str:
         last = f", last residual {self.history[-1]:g}" if self.history else ""
-        last += f", {self.reason.format(**self.fields)}" if self.reason else ""
+        last += f", {self.reason} {dict(self.fields)}" if self.reason else ""
         return f"no convergence after {len(self.history)} iterations{last}"
 
 

@@ -81,9 +81,17 @@ def reason_of(failure: Failure, interface: Interface) -> Text:
         )
     fields = {"count": len(failure.history), "last": ", ".join(f"{x:.2g}" for x in failure.history[-3:])}
     if failure.reason:
-        why = Text(failure.reason, failure.fields)
-        return Text("{count} iterations, last residuals {last}, {why}", {**fields, "why": why})
+        return Text("{count} iterations, last residuals {last}, {why}", {**fields, "why": _why(failure)})
     return Text("{count} iterations, last residuals {last}", fields)
+
+
+def _why(failure: NotConverged) -> Text:
+    """Word what stopped the iterations before their number did."""
+    if failure.reason == "wavering":
+        return Text("{count} pairs change status back and forth", failure.fields)
+    if failure.reason == "inner":
+        return Text("the penalty problem of pass {number} is not solved in {steps} steps", failure.fields)
+    return Text("the laws are broken by {size}", failure.fields)
 
 
 def _unbalanced(failure: ContactUnbalanced, interface: Interface) -> Text:

@@ -153,7 +153,7 @@ def solve_uzawa(
         if converged or not found.converged:
             converged = converged and found.converged
             if not found.converged:
-                reason = "the penalty problem of pass {number} is not solved in {steps} steps"
+                reason = "inner"
             break
     status = exact.project(exact.augmented(*now))[1]
     state = physical_state(interface, law, problem, *now, status, history, slip_origin)

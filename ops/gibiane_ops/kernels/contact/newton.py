@@ -168,7 +168,7 @@ def _solve(
     if not best.converged:
         raise_if_runaway(interface, state(last), state(best))
         wavering = int(np.count_nonzero(best.status != last.status))
-        reason = "{count} pairs change status back and forth" if wavering else ""
+        reason = "wavering" if wavering else ""
         raise NotConverged(history, state(best), reason, {"count": wavering})
     return state(best)
 

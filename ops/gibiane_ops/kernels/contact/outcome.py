@@ -63,7 +63,7 @@ def finished(
     state : ContactState
     converged : bool
     reason : str
-        What stopped the method, with the names of `fields` between braces.
+        What stopped the method, see ``NotConverged``; `fields` are its numbers.
 
     Returns
     -------
@@ -102,5 +102,5 @@ def accepted(state: ContactState, tolerance: float | None) -> ContactState:
         When a departure exceeds ``DEPARTURE``, or a hundred times the tolerance if this is more.
     """
     if not state.report.worst <= max(DEPARTURE, 100 * (tolerance or 0.0)):
-        raise NotConverged(state.history, state, "the laws are broken by {size}", {"size": f"{state.report.worst:.2g}"})
+        raise NotConverged(state.history, state, "laws", {"size": f"{state.report.worst:.2g}"})
     return state
