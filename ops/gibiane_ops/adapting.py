@@ -7,12 +7,13 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, TABLE, Table
-from gibiane_ops.kernels import geometry
+from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.adapt import degrees, moving
 from gibiane_ops.kernels.adapt.orders import singular_orders
-from gibiane_ops.kernels.adapt.sizes import element_sizes
+from gibiane_ops.kernels.adapt.sizes import element_sizes, nodal_sizes
 from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
 from gibiane_ops.kernels.assembly import internal_forces
+from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.algebra import SCAL
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
@@ -49,6 +50,7 @@ def _degrees(
     nodes, blocks = _numbered(zones)
     dim = zones[0].dim
     points = store.coords[nodes][:, :dim]
+    pairs = coincident(points)
     with worded(ctx, at="smooth"):
         stress = [_at_nodes(ctx, smooth, zone) for zone in zones]
         measures = [np.abs(geometry.measures(shape(n), points[c])) for n, c in blocks]
@@ -58,31 +60,41 @@ def _degrees(
             len(points), blocks, error**2, np.concatenate(measures), degree.astype(np.float64), beta=beta
         )
         size = np.concatenate([element_sizes(shape(n), m) for (n, _), m in zip(blocks, measures, strict=True)])
-        length = degrees.smoothness(points, blocks, stress)
-        near = degrees.near_singular(len(points), blocks, order < degree)
-        kinds = np.concatenate([np.full(len(c), degrees.ADDED.get(n, 1.0)) for n, c in blocks])
-        found = degrees.plan(
-            error**2,
-            target,
-            order=order,
-            may_rise=(degree == 1) & (order >= degree - degrees.SLACK) & ~(near & (not seul)),
-            ratio=size / length,
-            added=kinds,
-            dim=dim,
-            may_halve=not seul,
-        )
-    wanted = size * 0.5**found.halvings
-    nodal = np.full(len(points), np.inf)
-    start = 0
+        peak = order < degree
+        left = degrees.left_by_degree(size, degrees.smoothness(points, blocks, stress), peak)
+        may_rise = degree == 1
+        if pairs is not None:  # contacts pair corner by corner: REMAILLER keeps them linear
+            paired = np.zeros(len(points), bool)
+            paired[pairs] = True
+            may_rise &= ~degrees.with_facet_on(blocks, paired)
+        cost = np.concatenate([np.full(len(c), degrees.NODES.get(n, 1.0)) for n, c in blocks])
+        high = [(QUADRATIC.get(n, n), c) for n, c in blocks]
+        raised_cost = np.concatenate([np.full(len(c), degrees.NODES.get(n, 1.0)) for n, c in high])
+        if seul:
+            added = np.maximum(raised_cost - cost, 1.0)
+            rows, predicted = degrees.raise_only(error**2, target, left=left, added=added, may_rise=may_rise)
+            found = degrees.Plan(rows, np.ones(len(rows)), predicted, 0.0)
+        else:
+            found = degrees.plan(
+                error**2,
+                target,
+                order=order,
+                raised_order=np.where(peak, order, 2.0),
+                left=left,
+                cost=cost,
+                raised_cost=raised_cost,
+                may_rise=may_rise,
+                dim=dim,
+            )
+    nodal = nodal_sizes(len(points), topology.corner_blocks(blocks), found.ratios * size, pairs=pairs)
+    middles = topology.middles(blocks)
+    nodal[middles[:, 2]] = nodal[middles[:, :2]].mean(axis=1)
     marks = []
+    start = 0
     for zone, (_, cells) in zip(zones, blocks, strict=True):
-        rows = slice(start, start + len(cells))
+        rows = found.raised[start : start + len(cells)]
         start += len(cells)
-        np.minimum.at(nodal, cells, wanted[rows][:, None])
-        marks.append(ChamZone(zone, [SCAL], found.raised[rows].astype(np.float64)[:, None, None]))
-    pairs = coincident(points)
-    if pairs is not None:
-        nodal[pairs] = nodal[pairs].min(axis=1)[:, None]
+        marks.append(ChamZone(zone, [SCAL], rows.astype(np.float64)[:, None, None]))
     return ChPoint(store, {SCAL: (nodes, nodal)}, DIFFUS), MChaml(marks, MATERIAL, "GRAVITE"), found.predicted
 
 

@@ -80,7 +80,7 @@ def divide(
     else:
         sizes = np.broadcast_to(np.asarray(sizes_at(ctx, size, ids), np.float64), len(ids))
         with explained(ctx, "g"):
-            state, _ = adapted(state, sizes, counted=marks is None)
+            state, _ = adapted(state, sizes)
             mesh = state.mesh()
         new = store.add(mesh.points, store.density[ids][_nearest(before.points, mesh.points)])
         degree = _inherited(name, before, mesh, degree)
