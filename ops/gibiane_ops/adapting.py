@@ -62,40 +62,39 @@ def _degrees(
         size = np.concatenate([element_sizes(shape(n), m) for (n, _), m in zip(blocks, measures, strict=True)])
         peak = order < degree
         left = degrees.left_by_degree(size, degrees.smoothness(points, blocks, stress), peak)
-        may_rise = degree == 1
+        may_rise = np.ones(len(degree), bool)
         if pairs is not None:  # contacts pair corner by corner: REMAILLER keeps them linear
             paired = np.zeros(len(points), bool)
             paired[pairs] = True
             may_rise &= ~degrees.with_facet_on(blocks, paired)
-        cost = np.concatenate([np.full(len(c), degrees.NODES.get(n, 1.0)) for n, c in blocks])
-        high = [(QUADRATIC.get(n, n), c) for n, c in blocks]
-        raised_cost = np.concatenate([np.full(len(c), degrees.NODES.get(n, 1.0)) for n, c in high])
+        kinds = [(topology.LINEAR.get(n, n), QUADRATIC.get(n, n), len(c)) for n, c in blocks]
+        may_rise &= np.concatenate([np.full(n, low in QUADRATIC) for low, _, n in kinds])
+        cost = np.stack(
+            [np.concatenate([np.full(k[2], degrees.NODES.get(k[row], 1.0)) for k in kinds]) for row in (0, 1)]
+        )
+        now = degree == 2
         if seul:
-            added = np.maximum(raised_cost - cost, 1.0)
-            rows, predicted = degrees.raise_only(error**2, target, left=left, added=added, may_rise=may_rise)
-            found = degrees.Plan(rows, np.ones(len(rows)), predicted, 0.0)
-        else:
-            found = degrees.plan(
-                error**2,
-                target,
-                order=order,
-                raised_order=np.where(peak, order, 2.0),
-                left=left,
-                cost=cost,
-                raised_cost=raised_cost,
-                may_rise=may_rise,
-                dim=dim,
+            rows, predicted = degrees.raise_only(
+                error**2, target, left=left, added=np.maximum(cost[1] - cost[0], 1.0), may_rise=may_rise & ~now
             )
-    nodal = nodal_sizes(len(points), topology.corner_blocks(blocks), found.ratios * size, pairs=pairs)
-    middles = topology.middles(blocks)
-    nodal[middles[:, 2]] = nodal[middles[:, :2]].mean(axis=1)
+            quadratic, nodal = now | rows, nodal_sizes(len(points), blocks, size, pairs=pairs)
+        else:
+            error2 = np.where(now, np.stack([error**2 / left, error**2]), np.stack([error**2, error**2 * left]))
+            choices = degrees.Choices(
+                error2,
+                np.where(peak, order, np.array([[1.0], [2.0]])),
+                cost,
+                np.stack([np.ones(len(now), bool), may_rise]),
+            )
+            nodal, found = degrees.degree_map(points, blocks, size, choices, target, pairs=pairs)
+            quadratic, predicted = found.quadratic, found.predicted
     marks = []
     start = 0
     for zone, (_, cells) in zip(zones, blocks, strict=True):
-        rows = found.raised[start : start + len(cells)]
+        rows = quadratic[start : start + len(cells)]
         start += len(cells)
         marks.append(ChamZone(zone, [SCAL], rows.astype(np.float64)[:, None, None]))
-    return ChPoint(store, {SCAL: (nodes, nodal)}, DIFFUS), MChaml(marks, MATERIAL, "GRAVITE"), found.predicted
+    return ChPoint(store, {SCAL: (nodes, nodal)}, DIFFUS), MChaml(marks, MATERIAL, "GRAVITE"), predicted
 
 
 def _numbered(zones: list[ModelZone]) -> tuple[IntArray, list[tuple[str, IntArray]]]:

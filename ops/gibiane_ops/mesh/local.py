@@ -50,7 +50,7 @@ def divide(
     table : Table
         Groups, and ARBRE if the mesh has been divided before.
     marks : MChaml, optional
-        Elements above 0.5 become quadratic.
+        Elements above 0.5 become quadratic, the others linear.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def divide(
     dim = dimension(ctx)
     name, cells, degree = _elements(ctx, g, dim)
     if marks is not None:
-        degree = np.maximum(degree, 1 + _marked(cells, marks))
+        degree = 1 + _marked(cells, marks)
     old = Groups(ctx, table, np.unique(cells), SHAPES[dim][name])
     state, ids, cells, degree = _history(ctx, name, cells, degree, table, old)
     unknown = [old.keys[key] for key in old.cells if key not in state.groups]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels import geometry, topology
-from gibiane_ops.kernels.adapt.sizes import FLOOR
-from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.adapt.sizes import FLOOR, limit_growth, nodal_sizes
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.topology import Block
@@ -22,11 +22,39 @@ NODES = {
 }  # fmt: skip
 """Nodes per element of a large mesh: what an element costs."""
 
+ROUNDS = 4
+"""Times that degrees and sizes are planned, with the sizes that the last plan gave."""
+
 LEFT_BY_DEGREE = 1 / 60
 """Share of the squared error that the second degree leaves, for elements as large as the slope of the stress varies."""
 
+ROUND_OFF = 1e-10
+"""Change of a stress over an element, in units of the largest, below which it is none."""
+
 LEFT_AT_PEAK = 0.25
 """The same in elements that touch a singularity of order one half: p^(-4 lambda)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """What each element may become: row 0 linear, row 1 quadratic.
+
+    Attributes
+    ----------
+    error2 : (2, m) float64
+        Squared errors at the sizes of now.
+    order : (2, m) float64
+        Orders of convergence.
+    nodes : (2, m) float64
+        Nodes per element, see `NODES`.
+    allowed : (2, m) bool
+        At least one of the two.
+    """
+
+    error2: FloatArray
+    order: FloatArray
+    nodes: FloatArray
+    allowed: BoolArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +63,7 @@ class Plan:
 
     Attributes
     ----------
-    raised : (m,) bool
-        Elements whose degree goes up.
+    quadratic : (m,) bool
     ratios : (m,) float64
         New over old size.
     predicted : float
@@ -45,7 +72,7 @@ class Plan:
         Nodes expected then.
     """
 
-    raised: BoolArray
+    quadratic: BoolArray
     ratios: FloatArray
     predicted: float
     nodes: float
@@ -88,6 +115,7 @@ def smoothness(points: FloatArray, blocks: Sequence[Block], stress: Sequence[Flo
         integral = np.einsum("mq,mqcd->mcd", weight, slope)
         np.add.at(mean, cells[:, : shape(name).n_corners], integral[:, None])
     mean[total > 0] /= total[total > 0][:, None, None]
+    highest = max(float(np.abs(values).max(initial=0.0)) for values in stress)
     first, second = [], []
     for (name, cells), weight in zip(topology.corner_blocks(blocks), weights, strict=True):
         of = shape(name)
@@ -97,7 +125,11 @@ def smoothness(points: FloatArray, blocks: Sequence[Block], stress: Sequence[Flo
         inside = np.einsum("qn,mnce->mqce", of.N(of.gauss[0]), at)
         weight = density * of.gauss[1]
         first.append((weight * (inside**2).sum(axis=(2, 3))).sum(axis=1))
-        second.append((weight * (curved**2).sum(axis=(2, 3, 4))).sum(axis=1))
+        bend = (weight * (curved**2).sum(axis=(2, 3, 4))).sum(axis=1)
+        measure = weight.sum(axis=1)
+        # round-off of a linear stress is no curvature
+        noise = ROUND_OFF**2 * highest**2 * measure ** (1 - 4 / of.dim)
+        second.append(np.where(bend > noise, bend, 0.0))
     sums = [_over_stars(n, blocks, np.concatenate(each)) for each in (first, second)]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(sums[1] > 0, np.sqrt(sums[0] / sums[1]), np.inf), np.float64)
@@ -139,37 +171,17 @@ def left_by_degree(size: FloatArray, length: FloatArray, peak: BoolArray) -> Flo
     return np.where(peak, LEFT_AT_PEAK, np.minimum(LEFT_BY_DEGREE * (size / length) ** 2, 1.0))
 
 
-def plan(
-    error2: FloatArray,
-    target: float,
-    *,
-    order: FloatArray,
-    raised_order: FloatArray,
-    left: FloatArray,
-    cost: FloatArray,
-    raised_cost: FloatArray,
-    may_rise: BoolArray,
-    dim: int,
-    largest: float = np.inf,
-) -> Plan:
+def plan(of: Choices, target: float, dim: int, largest: float | FloatArray = np.inf) -> Plan:
     """Choose the degree and the size of each element that give the prescribed error with the fewest nodes.
 
     Parameters
     ----------
-    error2 : (m,) float64
-        Squared errors.
+    of : Choices
     target : float
         Error wanted of the whole.
-    order, raised_order : (m,) float64
-        Order of convergence of each element as it is, and raised.
-    left : (m,) float64
-        Share of the squared error that raising leaves at the size of now, see `left_by_degree`.
-    cost, raised_cost : (m,) float64
-        Nodes per element, see `NODES`, as it is and raised.
-    may_rise : (m,) bool
     dim : int
-    largest : float
-        Most that a size may grow, as a ratio.
+    largest : float or (m,) float64
+        Most that sizes may grow, as a ratio.
 
     Returns
     -------
@@ -183,38 +195,92 @@ def plan(
     Notes
     -----
     The sum of ``c r^-d`` is least under ``sum r^(2q) e^2 = target^2``. For a multiplier A each element takes alone
-    the better of its two choices, ``r = (d c / (2 A q e^2))^(1/(2q+d))`` in both: linear elements with their error and
-    order, quadratic ones with theirs. The error falls as A grows, so that A is found by bisection; where elements
-    change their choice the error jumps, and the plan stays below the target.
+    the better of its two choices, ``r = (d c / (2 A q e^2))^(1/(2q+d))`` in both: linear with its error and order,
+    quadratic with its own. The error falls as A grows, so that A is found by bisection; where elements change their
+    choice the error jumps, and the plan stays below the target.
     """
     if not target > 0:
         raise BadValue("target", target, "target > 0")
-    if not error2.any():
-        return Plan(np.zeros(len(error2), bool), np.ones(len(error2)), 0.0, float(cost.sum()))
-    floored = np.maximum(error2, FLOOR * error2.mean())
-    e2 = np.stack([floored, floored * np.maximum(left, FLOOR)])
-    q, c = np.stack([order, raised_order]), np.stack([cost, raised_cost])
+    m = of.error2.shape[1]
+    if not of.error2.any():
+        now = of.allowed[1] & ~of.allowed[0]
+        return Plan(now, np.ones(m), 0.0, float(np.where(now, of.nodes[1], of.nodes[0]).sum()))
+    e2 = np.maximum(of.error2, FLOOR * of.error2[of.allowed].mean())
 
-    def choice(log_a: float) -> tuple[FloatArray, FloatArray, BoolArray]:
-        r = np.exp((np.log(dim * c / (2 * q * e2)) - log_a) / (2 * q + dim))
+    def choice(log_a: float) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        r = np.exp((np.log(dim * of.nodes / (2 * of.order * e2)) - log_a) / (2 * of.order + dim))
         r = np.minimum(r, largest)
-        error, nodes = r ** (2 * q) * e2, c * r**-dim
-        price = nodes + np.exp(log_a) * error
-        rise = may_rise & (price[1] < price[0])
-        pick = rise.astype(np.int64)[None]
-        return (*(np.take_along_axis(each, pick, 0)[0] for each in (r, error)), rise)
+        error, nodes = r ** (2 * of.order) * e2, of.nodes * r**-dim
+        price = np.where(of.allowed, nodes + np.exp(log_a) * error, np.inf)
+        quadratic = price[1] < price[0]
+        r, error, nodes = (np.where(quadratic, each[1], each[0]) for each in (r, error, nodes))
+        return r, error, nodes, quadratic
 
-    middle = float(np.log(cost.sum() / floored.sum()))
+    middle = float(np.log(of.nodes.sum() / e2.sum()))
     low, high = middle - 80.0, middle + 80.0
     for _ in range(70):
         log_a = 0.5 * (low + high)
-        if choice(log_a)[1].sum() > target**2:
-            low = log_a
-        else:
-            high = log_a
-    r, error, rise = choice(high)
-    nodes = np.where(rise, raised_cost, cost) * r**-dim
-    return Plan(rise, r, float(np.sqrt(error.sum())), float(nodes.sum()))
+        low, high = (log_a, high) if choice(log_a)[1].sum() > target**2 else (low, log_a)
+    r, error, nodes, quadratic = choice(high)
+    return Plan(quadratic, r, float(np.sqrt(error.sum())), float(nodes.sum()))
+
+
+def degree_map(
+    points: FloatArray,
+    blocks: Sequence[Block],
+    size: FloatArray,
+    of: Choices,
+    target: float,
+    *,
+    growth: float = 2.0,
+    pairs: IntArray | None = None,
+) -> tuple[FloatArray, Plan]:
+    """Bring the plan to the nodes, and plan again with the sizes that the neighbours let elements have.
+
+    Parameters
+    ----------
+    points : (n, dim) float64, length
+    blocks : sequence of (str, (m, n_nodes) int64)
+    size : (n_cells,) float64, length
+        Sizes of now.
+    of, target
+        See `plan`.
+    growth : float
+        See `limit_growth`.
+    pairs : (k, 2) int64, optional
+        See `nodal_sizes`.
+
+    Returns
+    -------
+    nodal : (n,) float64, length
+        Sizes wanted.
+    plan : Plan
+        With the sizes that elements get from the nodes.
+
+    Notes
+    -----
+    Beside small elements large ones are small too, and then quadratic ones cost more than they gain: the sizes that
+    elements get bound the next plan, `ROUNDS` times. One factor on all sizes restores the error that means between
+    neighbours change.
+    """
+    corner = topology.corner_blocks(blocks)
+    dim = points.shape[1]
+    edges = topology.edges(corner)
+    links = edges if pairs is None else np.concatenate([edges, pairs])
+    largest: FloatArray = np.full(len(size), np.inf)
+    for _ in range(ROUNDS):
+        found = plan(of, target, dim, largest)
+        nodal = nodal_sizes(len(points), corner, found.ratios * size, pairs=pairs)
+        nodal = limit_growth(points, links, nodal, growth)
+        got = np.concatenate([np.exp(np.log(nodal[cells]).mean(axis=1)) for _, cells in corner]) / size
+        row = found.quadratic.astype(np.int64)[None]
+        order, error2, nodes = (np.take_along_axis(each, row, 0)[0] for each in (of.order, of.error2, of.nodes))
+        predicted = float(np.sqrt((got ** (2 * order) * error2).sum()))
+        final = Plan(found.quadratic, got, predicted, float((nodes * got**-dim).sum()))
+        largest = np.where(got < found.ratios, got, np.inf)
+    middles = topology.middles(blocks)
+    nodal[middles[:, 2]] = nodal[middles[:, :2]].mean(axis=1)
+    return nodal, final
 
 
 def raise_only(
@@ -227,7 +293,7 @@ def raise_only(
     error2 : (m,) float64
     target : float
     left : (m,) float64
-        See `plan`.
+        See `left_by_degree`.
     added : (m,) float64
         Nodes that raising an element adds.
     may_rise : (m,) bool

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gibiane_ops.kernels import topology
+from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.adapt import bisection, octree
 from gibiane_ops.kernels.adapt.bisection import Bisection
 from gibiane_ops.kernels.adapt.octree import Octree
-from gibiane_ops.kernels.adapt.sizes import predicted_count
+from gibiane_ops.kernels.adapt.sizes import element_sizes, predicted_count
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
@@ -250,12 +250,18 @@ def adapted(state: Hierarchy, sizes: FloatArray, *, counted: bool = True) -> tup
     if not (np.isfinite(sizes).all() and (sizes > 0).all()):
         bad = sizes[~(np.isfinite(sizes) & (sizes > 0))]
         raise BadValue("size", float(bad[0]), "finite and positive")
-    points, cells, _, _ = state._stage()
+    points, cells, root, _ = state._stage()
     common = np.zeros(len(points))
     number = np.zeros(len(points))
     np.add.at(common, cells, np.log(sizes[now.cells]))
     np.add.at(number, cells, 1.0)
     asked = np.exp(common / np.maximum(number, 1.0))
+    # Nothing becomes larger than in the first mesh: sizes above would ask for fewer elements than there can be.
+    of = shape(state.name)
+    whole = np.bincount(root, np.abs(geometry.measures(of, points[cells])))
+    widest = np.zeros(len(points))
+    np.maximum.at(widest, cells, element_sizes(of, whole)[root][:, None])
+    asked = np.minimum(asked, widest)
     if not counted:
         tree = _resized(state.tree, asked)
         return replace(state, tree=tree), [_count(tree)]
