@@ -1,9 +1,8 @@
-"""hp against h and against p on the L-shaped plate, at the true error; what the second degree leaves on smooth fields."""
+"""hp against h and against p on the L-shaped plate, at the true error."""
 
 import io
 
 import numpy as np
-import pytest
 
 from gibiane.session import Session
 

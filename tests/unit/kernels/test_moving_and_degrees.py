@@ -149,9 +149,10 @@ def choices(error2, left, order=None, may_rise=None):
     error2 = np.asarray(error2, float)
     m = len(error2)
     order = np.ones(m) if order is None else order
+    may_rise = np.ones(m, bool) if may_rise is None else may_rise
     return degrees.Choices(
         np.stack([error2, error2 * left]), np.stack([order, np.where(order == 1, 2.0, order)]),
-        np.repeat([[0.5], [2.0]], m, axis=1), np.stack([np.ones(m, bool), np.ones(m, bool) if may_rise is None else may_rise]),
+        np.repeat([[0.5], [2.0]], m, axis=1), np.stack([np.ones(m, bool), may_rise]),
     )  # fmt: skip
 
 
@@ -244,7 +245,9 @@ def test_the_smoothness_length_of_an_exponential_is_its_decay(name):
 
 
 def test_what_the_second_degree_leaves_is_at_most_everything():
-    left = degrees.left_by_degree(np.array([0.1, 100.0, 0.1]), np.array([1.0, 1.0, 1.0]), np.array([False, False, True]))
+    left = degrees.left_by_degree(
+        np.array([0.1, 100.0, 0.1]), np.array([1.0, 1.0, 1.0]), np.array([False, False, True])
+    )
     assert left == pytest.approx([0.01 / 60, 1.0, degrees.LEFT_AT_PEAK])
 
 
