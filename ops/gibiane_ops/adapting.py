@@ -13,7 +13,7 @@ from gibiane_ops.kernels.adapt.orders import singular_orders
 from gibiane_ops.kernels.adapt.sizes import element_sizes, nodal_sizes
 from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
 from gibiane_ops.kernels.assembly import internal_forces
-from gibiane_ops.kernels.elements.quadratic import QUADRATIC
+from gibiane_ops.kernels.elements.quadratic import LINEAR, QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.algebra import SCAL
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
@@ -67,10 +67,11 @@ def _degrees(
             paired = np.zeros(len(points), bool)
             paired[pairs] = True
             may_rise &= ~degrees.with_facet_on(blocks, paired)
-        kinds = [(topology.LINEAR.get(n, n), QUADRATIC.get(n, n), len(c)) for n, c in blocks]
-        may_rise &= np.concatenate([np.full(n, low in QUADRATIC) for low, _, n in kinds])
+        low = [(LINEAR.get(n, n), c) for n, c in blocks]
+        high = [(QUADRATIC.get(n, n), c) for n, c in low]
+        may_rise &= np.concatenate([np.full(len(c), n in QUADRATIC) for n, c in low])
         cost = np.stack(
-            [np.concatenate([np.full(k[2], degrees.NODES.get(k[row], 1.0)) for k in kinds]) for row in (0, 1)]
+            [np.concatenate([np.full(len(c), degrees.NODES.get(n, 1.0)) for n, c in each]) for each in (low, high)]
         )
         now = degree == 2
         if seul:
