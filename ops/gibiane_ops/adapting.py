@@ -7,7 +7,7 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, TABLE, Table
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.adapt import degrees, moving
 from gibiane_ops.kernels.adapt.orders import singular_orders
 from gibiane_ops.kernels.adapt.sizes import element_sizes, nodal_sizes

@@ -330,5 +330,6 @@ def with_facet_on(blocks: Sequence[Block], on: BoolArray) -> BoolArray:
     """
     found: list[BoolArray] = []
     for name, cells in topology.corner_blocks(blocks):
-        found.append(np.stack([on[cells[:, list(n)]].all(axis=1) for _, n in shape(name).faces], 1).any(axis=1))
+        inside = [on[cells[:, list(n)]].all(axis=1) for _, n in shape(name).faces]
+        found.append(np.asarray(np.stack(inside, 1).any(axis=1), np.bool_))
     return np.concatenate(found)

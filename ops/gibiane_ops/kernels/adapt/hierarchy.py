@@ -258,7 +258,7 @@ def adapted(state: Hierarchy, sizes: FloatArray, *, counted: bool = True) -> tup
     asked = np.exp(common / np.maximum(number, 1.0))
     # Nothing becomes larger than in the first mesh: sizes above would ask for fewer elements than there can be.
     of = shape(state.name)
-    whole = np.bincount(root, np.abs(geometry.measures(of, points[cells])))
+    whole = np.asarray(np.bincount(root, np.abs(geometry.measures(of, points[cells]))), np.float64)
     widest = np.zeros(len(points))
     np.maximum.at(widest, cells, element_sizes(of, whole)[root][:, None])
     asked = np.minimum(asked, widest)
