@@ -69,9 +69,10 @@ class NodeStore:
 
         kept, dropped = self.canonical(kept), self.canonical(dropped)
         links = coo_array((np.ones(len(kept), bool), (kept, dropped)), shape=(self.count, self.count))
-        _, group = connected_components(links, directed=False)
-        # Of each group of linked nodes the first stands for all.
-        _, first = np.unique(group, return_index=True)
+        count, group = connected_components(links, directed=False)
+        # Of each group of linked nodes the first stands for all: the last one written.
+        first = np.empty(count, np.int64)
+        first[group[::-1]] = np.arange(self.count - 1, -1, -1)
         self._alias[: self.count] = first[group][self._alias[: self.count]]
         self.version += 1
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,8 +38,8 @@ def is_in(cells: IntArray, others: IntArray) -> BoolArray:
     here[cells.ravel()] = True
     there[others.ravel()] = True
     shared = here & there
-    mine = np.flatnonzero(shared[cells].all(axis=1))
-    theirs = np.flatnonzero(shared[others].all(axis=1))
+    mine = np.flatnonzero(functools.reduce(np.logical_and, shared[cells].T))
+    theirs = np.flatnonzero(functools.reduce(np.logical_and, shared[others].T))
     if len(mine) and len(theirs):
         group, _ = topology.group_by_nodes(np.concatenate([others[theirs], cells[mine]]))
         known = np.zeros(int(group.max()) + 1, bool)
