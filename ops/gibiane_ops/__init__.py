@@ -180,6 +180,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "DEPIMPOSE": ("gibiane_ops.conditions",),
     "RELA": ("gibiane_ops.relations",),
     "FORCE": ("gibiane_ops.loads",),
+    "MOMENT": ("gibiane_ops.loads",),
     "PRESSION": ("gibiane_ops.loads", "gibiane_ops.pressures"),
     "FSUR": ("gibiane_ops.loads",),
     "CNEQ": ("gibiane_ops.loads",),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,12 @@ from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.values.champs import DISCRET, ChPoint, MChaml
-from gibiane_ops.values.conditions import family, support
+from gibiane_ops.values.conditions import ROTATIONS, family, support
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.material import MATERIAL, on_zone, properties, solid_zones
 from gibiane_ops.values.mechanics import checked_corners
-from gibiane_ops.values.modele import FORCES, Modele, ModelZone
+from gibiane_ops.values.modele import DUALS, FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
 _EXAMPLE = (
@@ -56,19 +56,56 @@ def _forc(ctx: Context, v: Point, g: Maillage | Point) -> ChPoint:
 def _forc_named(
     ctx: Context, fx: float | None, fy: float | None, fz: float | None, fr: float | None, g: Maillage | Point
 ) -> ChPoint:
-    given = {n: x for n, x in (("FX", fx), ("FY", fy), ("FZ", fz), ("FR", fr)) if x is not None}
-    wrong = [n for n in given if n not in FORCES[family(ctx)]]
+    return _by_name(ctx, {"FX": fx, "FY": fy, "FZ": fz, "FR": fr}, FORCES[family(ctx)], g)
+
+
+def _by_name(ctx: Context, values: dict[str, float | None], known: Sequence[str], g: Maillage | Point) -> ChPoint:
+    """Share the components given between the nodes of a mesh."""
+    given = {n: x for n, x in values.items() if x is not None}
+    wrong = [n for n in given if n not in known]
     if wrong or not given:
         ctx.fail(
             197,
             "{name} is not a force here; the forces are {known}",
             name=wrong[0] if wrong else "this",
-            known=" ".join(FORCES[family(ctx)]),
+            known=" ".join(known),
         )
     nodes = support(ctx, g)
     return ChPoint(
         node_store(ctx), {n: (nodes, np.full(len(nodes), x / len(nodes))) for n, x in given.items()}, DISCRET
     )
+
+
+MOME = operator(
+    "MOMENT",
+    topic="loads",
+    summary="moments on the nodes of a mesh or point",
+    notice="`MOME V G`: the vector V is shared between the nodes of G, V/n each; `MOME 'MZ' x G` likewise, by "
+    "component (MX MY MZ in space, MZ in the plane, MT in mode AXIS). Solids and bars have no rotations: RESO says so "
+    "(54), and a couple on a face of a solid is a pair of forces, or a traction (FSUR of a CHPOINT).",
+    example="OPTI DIME 2 ; P = 0. 0. ; LIST (MOME 'MZ' 2. P) ;",
+    see=["FORCE", "FSUR"],
+)
+
+
+@MOME.form(Arg("v", POINT, "vector"), Arg("g", (MAILLAGE, POINT), "where"), gives=[CHPOINT])
+def _mome(ctx: Context, v: Point, g: Maillage | Point) -> ChPoint:
+    names = MOMENTS[family(ctx)]
+    if len(names) == 1:
+        ctx.fail(34, "a vector of moments is for space: here MOME '{name}' x G", at="v", name=names[0])
+    nodes = support(ctx, g)
+    return ChPoint.from_table(node_store(ctx), names, nodes, np.tile(v.coords / len(nodes), (len(nodes), 1)), DISCRET)
+
+
+@MOME.form(
+    *(Key(name, "component", Arg("x", FLOTTANT)) for name in ("MX", "MY", "MZ", "MT")),
+    Arg("g", (MAILLAGE, POINT), "where"),
+    gives=[CHPOINT],
+)
+def _mome_named(
+    ctx: Context, mx: float | None, my: float | None, mz: float | None, mt: float | None, g: Maillage | Point
+) -> ChPoint:
+    return _by_name(ctx, {"MX": mx, "MY": my, "MZ": mz, "MT": mt}, MOMENTS[family(ctx)], g)
 
 
 PRES = operator(
@@ -105,6 +142,7 @@ CNEQ = operator(
     example=_EXAMPLE + "F = CNEQ MO (MANU 'CHPO' S 'FY' (-9.81 * 7800.)) ; LIST (RESU F) ;",
     see=["FORCE", "PRESSION", "MASSE"],
 )
+MOMENTS = {mode: tuple(DUALS[name] for name in names) for mode, names in ROTATIONS.items()}
 MASSIVE = Key("MASS", "on a solid", required=True)
 Loaded = list[tuple[str, IntArray]]
 

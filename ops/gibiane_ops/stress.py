@@ -40,12 +40,7 @@ MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ; MA = MATE MO 'YOUN' 2.1E11 'NU'
 U = NOMC 'UZ' (1.E-3 * (COOR 3 V)) ;
 """
 
-LINEAR = Key(("LINE", "QUAD"), "linear strains (the default)", name="how")
-
-
-def _check_linear(ctx: Context, how: str | None) -> None:
-    if how == "QUAD":
-        ctx.fail(251, "quadratic strains are not available yet", at="how", hint="'LINE' is the default")
+ORDER = Key(("LINE", "QUAD"), "linear strains (the default), or those of Green and Lagrange", name="how")
 
 
 EPSI = operator(
@@ -54,18 +49,19 @@ EPSI = operator(
     summary="strains of a displacement field",
     notice="An element field of sub-type DEFORMATIONS at the stress points: EPXX EPYY EPZZ GAXY GAXZ GAYZ in "
     "space, EPXX EPYY EPZZ GAXY in the plane, EPRR EPZZ EPTT GARZ in mode AXIS (engineering shears), EPSS in "
-    "bars. In plane stress EPZZ is 0: ELAS of the stresses gives it.",
+    "bars. In plane stress EPZZ is 0: ELAS of the stresses gives it. 'QUAD': with the terms of second order (Green "
+    "and Lagrange), which a rotation, however large, does not change.",
     example=BLOCK + "MESS (MAXI (EXCO 'EPZZ' (EPSI MO U))) ;",
     see=["SIGMA", "ELAS"],
 )
 
 
 @EPSI.form(
-    Arg("model", MMODEL, "model"), Arg("u", CHPOINT, "displacement"), LINEAR, Key("NOER", "accepted"), gives=[MCHAML]
+    Arg("model", MMODEL, "model"), Arg("u", CHPOINT, "displacement"), ORDER, Key("NOER", "accepted"), gives=[MCHAML]
 )
 def _epsi(ctx: Context, model: Modele, u: ChPoint, how: str | None, noer: bool) -> MChaml:
-    _check_linear(ctx, how)
-    zones = [ChamZone(z, z.strains, mechanics.strains(ctx, z, u)) for z in solid_zones(ctx, model)]
+    quadratic = how == "QUAD"
+    zones = [ChamZone(z, z.strains, mechanics.strains(ctx, z, u, quadratic=quadratic)) for z in solid_zones(ctx, model)]
     return MChaml(zones, STRAIN, "STRESSES")
 
 
@@ -137,7 +133,7 @@ SIGM = operator(
     summary="stresses of a displacement field",
     notice="An element field of sub-type CONTRAINTES at the stress points: SMXX SMYY SMZZ SMXY SMXZ SMYZ in "
     "space, SMXX SMYY SMZZ SMXY in the plane, SMRR SMZZ SMTT SMRZ in mode AXIS, by the elastic law of the "
-    "material; the axial force EFFX in bars.",
+    "material; the axial force EFFX in bars. 'QUAD': of the strains of EPSI 'QUAD' (Piola and Kirchhoff's second).",
     example=BLOCK + "MESS (MAXI (EXCO 'SMZZ' (SIGM MO MA U))) ;",
     see=["EPSI", "VMIS", "ERREUR"],
 )
@@ -147,16 +143,16 @@ SIGM = operator(
     Arg("model", MMODEL, "model"),
     Arg("material", MCHAML, "material"),
     Arg("u", CHPOINT, "displacement"),
-    LINEAR,
+    ORDER,
     gives=[MCHAML],
 )
 def _sigm(ctx: Context, model: Modele, material: MChaml, u: ChPoint, how: str | None) -> MChaml:
-    _check_linear(ctx, how)
     (material,) = told_apart(ctx, [("material", material)], MATERIAL)
     zones = []
     for zone in solid_zones(ctx, model):
         law = elastic_law(ctx, material, zone, "material")
-        zones.append(ChamZone(zone, zone.stresses, assembly.stresses(mechanics.strains(ctx, zone, u), law)))
+        strain = mechanics.strains(ctx, zone, u, quadratic=how == "QUAD")
+        zones.append(ChamZone(zone, zone.stresses, assembly.stresses(strain, law)))
     return MChaml(zones, STRESS, "STRESSES")
 
 

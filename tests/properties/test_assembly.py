@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gibiane_ops.kernels import assembly, geometry, topology
-from gibiane_ops.kernels.arrays import strain_vector
+from gibiane_ops.kernels.arrays import component_of, strain_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import SHAPES
@@ -130,6 +130,25 @@ def test_single_elements_have_no_spurious_mode(name: str, mode: str) -> None:
 def test_symmetry(name: str) -> None:
     K = stiffness(name, *mesh(name, 5))
     assert np.abs((K - K.T).data).max() <= 1e-14 * np.abs(K.data).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_large_turn_has_no_strain_of_second_order(name: str) -> None:
+    """x = Q F X with Q a rotation: the strain is (F^T F - 1) / 2 whatever Q, in every element and at every point."""
+    points, cells = mesh(name, 4)
+    dim = points.shape[1]
+    rng = np.random.default_rng(2)
+    Q, _ = np.linalg.qr(rng.standard_normal((dim, dim)))
+    Q[0] *= np.sign(np.linalg.det(Q))
+    F = np.eye(dim) + 0.3 * rng.standard_normal((dim, dim))
+    u = points @ (Q @ F).T - points
+    found = assembly.strains(SHAPES[name], points[cells], u[cells], SHAPES[name].gauss[0], quadratic=True)
+    E = (F.T @ F - np.eye(dim)) / 2
+    expected = np.zeros(found.shape[2])
+    for i in range(dim):
+        for j in range(i, dim):
+            expected[component_of(i, j)] = E[i, j] * (1 if i == j else 2)
+    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=1e-11)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -183,8 +183,6 @@ MECHANICS = {
     "join the conditions of BLOQ or RIGI to the matrix with ET": "joindre les conditions de BLOQ ou RIGI à la matrice par ET",
     # stress, smoothing, estimation, sizes
     "the field has no displacement ({wanted}); it has {known}": "le champ n'a pas de déplacement ({wanted}) ; il a {known}",
-    "quadratic strains are not available yet": "les déformations quadratiques ne sont pas encore disponibles",
-    "'LINE' is the default": "'LINE' est le choix par défaut",
     "a field of stresses or of strains is wanted, not of sub-type {subtype}": "il faut un champ de contraintes ou de déformations, non de sous-type {subtype}",
     "{count} patches have too few elements: their nodes take the mean of the elements around them": "{count} ensembles ont trop peu d'éléments : leurs noeuds prennent la moyenne des éléments voisins",
     "a finer mesh, or LISSER 'MOYE'": "un maillage plus fin, ou LISSER 'MOYE'",
@@ -286,6 +284,7 @@ MECHANICS = {
     "all coefficients of the relation are zero": "tous les coefficients de la relation sont nuls",
     "{count} equations without symmetry factorised by SuperLU, slow at this size": "{count} équations sans symétrie factorisées par SuperLU, lent à cette taille",
     "pip install pypardiso": "pip install pypardiso",
+    "a vector of moments is for space: here MOME '{name}' x G": "un vecteur de moments est pour l'espace : ici MOME '{name}' x G",
     "the system without symmetry is singular: {reason}": "le système sans symétrie est singulier : {reason}",
     "a reaction of RELA 'DUAL' must work against its relation; conditions must hold the solid without those of MINI and MAXI": "la réaction de RELA 'DUAL' doit travailler contre sa relation ; sans les conditions MINI et MAXI, les autres doivent tenir le solide",
     "no set of unilateral conditions that act holds them all": "aucun ensemble de conditions unilatérales actives ne les satisfait toutes",

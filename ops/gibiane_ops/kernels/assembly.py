@@ -231,7 +231,14 @@ def assemble_vector(n_nodes: int, d: int, blocks: Sequence[tuple[IntArray, Float
 
 
 def strains(
-    shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, axisymmetric: bool = False, checked: bool = False
+    shape: Shape,
+    X: FloatArray,
+    U: FloatArray,
+    xi: FloatArray,
+    *,
+    axisymmetric: bool = False,
+    checked: bool = False,
+    quadratic: bool = False,
 ) -> FloatArray:
     """Compute the strains of a displacement field.
 
@@ -246,6 +253,9 @@ def strains(
     axisymmetric : bool
     checked : bool
         Refuse cells whose jacobian is not positive there.
+    quadratic : bool
+        Add the terms of second order: Green and Lagrange's strain ``(H + H^T + H^T H) / 2``, H the gradient of the
+        displacement in the undeformed state, which no rotation changes.
 
     Returns
     -------
@@ -268,9 +278,15 @@ def strains(
             found[part, :, component_of(i, i)] = H[..., i, i]
             for j in range(i + 1, dim):
                 found[part, :, component_of(i, j)] = H[..., i, j] + H[..., j, i]
+        if quadratic:
+            for i in range(dim):
+                for j in range(i, dim):
+                    product = (H[..., i] * H[..., j]).sum(axis=-1)
+                    found[part, :, component_of(i, j)] += 0.5 * product if i == j else product
     if axisymmetric:
         N = shape.N(xi)
-        found[:, :, component_of(2, 2)] = (U[:, :, 0] @ N.T) / (X[:, :, 0] @ N.T)
+        hoop = (U[:, :, 0] @ N.T) / (X[:, :, 0] @ N.T)
+        found[:, :, component_of(2, 2)] = hoop + 0.5 * hoop**2 if quadratic else hoop
     return found
 
 

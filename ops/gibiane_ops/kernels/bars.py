@@ -60,7 +60,7 @@ def bar_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
     return np.asarray((K + K.transpose(0, 2, 1)) / 2, np.float64)
 
 
-def bar_strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray) -> FloatArray:
+def bar_strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray, *, quadratic: bool = False) -> FloatArray:
     """Compute the axial strains of a displacement field.
 
     Parameters
@@ -68,12 +68,18 @@ def bar_strains(shape: Shape, X: FloatArray, U: FloatArray, xi: FloatArray) -> F
     shape : Shape
     X, U : (m, n_nodes, space_dim) float64, length
     xi : (q, 1) float64
+    quadratic : bool
+        Green and Lagrange's strain, ``t . du/ds + |du/ds|^2 / 2``.
 
     Returns
     -------
     (m, q, 1) float64
     """
-    return np.asarray(np.matmul(stretch_operator(shape, X, xi), U.reshape(len(U), -1, 1)), np.float64)
+    strain = np.asarray(np.matmul(stretch_operator(shape, X, xi), U.reshape(len(U), -1, 1)), np.float64)
+    if quadratic:
+        J, moved = geometry.jacobians(shape, X, xi)[..., 0], geometry.jacobians(shape, U, xi)[..., 0]
+        strain += 0.5 * ((moved**2).sum(axis=2) / (J**2).sum(axis=2))[..., None]
+    return strain
 
 
 def bar_forces(shape: Shape, X: FloatArray, tension: FloatArray) -> FloatArray:

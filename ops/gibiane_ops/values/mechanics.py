@@ -37,8 +37,11 @@ def stiffness(ctx: Context, zone: ModelZone, material: MChaml) -> FloatArray:
         return assembly.element_stiffness(shape(zone.shape), corners(ctx, zone), law, axisymmetric=zone.axisymmetric)
 
 
-def strains(ctx: Context, zone: ModelZone, u: ChPoint) -> FloatArray:
-    """Return the strains of a displacement field at the stress points, (m, q, c); error 181 without a component."""
+def strains(ctx: Context, zone: ModelZone, u: ChPoint, *, quadratic: bool = False) -> FloatArray:
+    """Return the strains of a displacement field at the stress points, (m, q, c); error 181 without a component.
+
+    `quadratic` adds the terms of second order (Green and Lagrange).
+    """
     names = DISPLACEMENTS[zone.family]
     if not set(names) & set(u.names):
         ctx.fail(
@@ -53,8 +56,9 @@ def strains(ctx: Context, zone: ModelZone, u: ChPoint) -> FloatArray:
     nodal = u.table(names, zone.cells.ravel()).reshape(x.shape)
     with worded(ctx, at="model"):
         if zone.bars:
-            return bars.bar_strains(of, x, nodal, xi)
-        return assembly.strains(of, x, nodal, xi, axisymmetric=zone.axisymmetric, checked=True)
+            return bars.bar_strains(of, x, nodal, xi, quadratic=quadratic)
+        axis = zone.axisymmetric
+        return assembly.strains(of, x, nodal, xi, axisymmetric=axis, checked=True, quadratic=quadratic)
 
 
 def internal_forces(ctx: Context, zone: ModelZone, stress: FloatArray) -> FloatArray:
