@@ -27,7 +27,7 @@ MECHANICS = {
     "no component is given": "aucune composante n'est donnée",
     "a name and a value: 'UX' 1.": "un nom et une valeur : 'UX' 1.",
     "the component {name} has {given} values for {wanted} points": "la composante {name} a {given} valeurs pour {wanted} points",
-    "a LISTREEL goes with a mesh of points (POI1), one value per point": "un LISTREEL va avec un maillage de points (POI1), une valeur par point",
+    "a LISTREEL has one value per node, in the order of CHAN 'POI1'": "une LISTREEL a une valeur par nœud, dans l'ordre de CHAN 'POI1'",
     "a point that comes twice has two values": "un point présent deux fois a deux valeurs",
     "{count} points come twice: the nature must say what becomes of their values": "{count} points sont là deux fois : la nature doit dire que faire de leurs valeurs",
     "'NATU' 'DISCRET' sums them, 'NATU' 'DIFFUS' wants them equal": "'NATU' 'DISCRET' les somme, 'NATU' 'DIFFUS' les veut égales",

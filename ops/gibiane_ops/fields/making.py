@@ -136,11 +136,11 @@ def _manu_chpo(ctx: Context, q: Operands) -> Any:
     if isinstance(given.where, Point):
         nodes = np.array([given.where.node])
     else:
-        nodes = given.where.cells("POI1").ravel() if points else given.where.nodes
+        nodes = given.where.cells("POI1").ravel() if points else given.where.nodes_in_order()
     parts: dict[str, Part] = {}
     for name, value in _components(ctx, given):
         if isinstance(value, ListReel):
-            if len(value.values) != len(nodes) or not (points or isinstance(given.where, Point)):
+            if len(value.values) != len(nodes):
                 ctx.fail(
                     212,
                     "the component {name} has {given} values for {wanted} points",
@@ -148,7 +148,7 @@ def _manu_chpo(ctx: Context, q: Operands) -> Any:
                     name=name,
                     given=len(value.values),
                     wanted=len(nodes),
-                    hint="a LISTREEL goes with a mesh of points (POI1), one value per point",
+                    hint="a LISTREEL has one value per node, in the order of CHAN 'POI1'",
                 )
             parts[name] = _distinct(ctx, nodes, value.values, nature)
         else:
