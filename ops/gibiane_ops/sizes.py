@@ -24,6 +24,9 @@ from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.results import wanted_results
 from gibiane_ops.values.sizing import coincident, error_map, prescribed
 
+NEARLY = 1.01
+"""An error that the smallest size makes larger by less than this is not worth a word."""
+
 TAIL = operator(
     "TAILLE",
     topic="adaptation",
@@ -136,6 +139,15 @@ def _wanted(
             count=round(found.optimum),
             limit=round(nbma),
             reachable=f"{reachable:.3g}",
+        )
+    elif found.reachable > NEARLY * prec:
+        ctx.warn(
+            "G410",
+            "an error of {wanted} needs smaller elements than {limit}; with these about {reachable} is reached",
+            level=0,
+            wanted=f"{prec:.4g}",
+            limit=f"{mini:.4g}",
+            reachable=f"{found.reachable:.3g}",
         )
     field = ChPoint(store, {SCAL: (nodes, found.nodal)}, DIFFUS)
     return (field, float(found.count)) if wanted_results(ctx) > 1 else field

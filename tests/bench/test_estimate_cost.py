@@ -53,7 +53,8 @@ def test_patches_and_map_against_the_contact_solution(bench, sizes):
         runs(session, "REA = REAC RC U ; SIG = SIGM MO MA U ;")()
         judge = runs(session, "XS XC XG CA = ERREUR 'CONTACT' 'SPR' MO SIG MA MC MATC U REA ;")
         size = f"{520 * n**3} CUB8"
-        bench.compare("SPR + error map", size, judge, {"contact solution": contact}, aim=0.1)
+        # Small problems are solved in no time: the aim is for the finest mesh of the scene.
+        bench.compare("SPR + error map", size, judge, {"contact solution": contact}, aim=0.1 if n >= 4 else None)
 
 
 @pytest.mark.bench
@@ -114,10 +115,19 @@ def chart(rows, path):
     for element, colour in (("CUB8", "#1f77b4"), ("TET4", "#d95f02")):
         own = [row for row in rows if row[0] == element]
         axes.scatter([r[2] for r in own], [r[3] for r in own], color=colour, label=element)
+        labels: list[list] = []
         for _, name, cost, theta in own:
-            axes.annotate(name, (cost, theta), textcoords="offset points", xytext=(5, 4), fontsize=8)
+            near = [each for each in labels if abs(each[2] - theta) < 0.01 and 0.8 < cost / each[1] < 1.25]
+            if near:
+                near[0][0] += ", " + name
+            else:
+                labels.append([name, cost, theta])
+        below = element == "TET4"  # so that marks of the two elements at one place keep their names
+        for name, cost, theta in labels:
+            axes.annotate(name, (cost, theta), textcoords="offset points", xytext=(5, -10 if below else 4), fontsize=8)
     axes.axhline(1.0, color="black", linewidth=0.8)
     axes.set_xscale("log")
+    axes.set_xlim(right=2.5 * max(row[2] for row in rows))
     axes.set_xlabel("time of the estimate over time of the solution")
     axes.set_ylabel("estimate over true error")
     axes.set_title("Clamped cube under pressure: what estimates cost and are worth")

@@ -229,6 +229,7 @@ MECHANICS = {
     "a keyword is not understood; INFO ERREUR lists them": "un mot-clé n'est pas compris ; INFO ERREUR en donne la liste",
     "the map has neither one component nor a component TOTA; it has {known}": "la carte n'a ni une seule composante ni de composante TOTA ; elle a {known}",
     "an error of {wanted} needs about {count} elements; with {limit} about {reachable} is reached": "une erreur de {wanted} demande environ {count} éléments ; avec {limit} on atteint environ {reachable}",
+    "an error of {wanted} needs smaller elements than {limit}; with these about {reachable} is reached": "une erreur de {wanted} demande des éléments plus petits que {limit} ; avec ceux-ci on atteint environ {reachable}",
     "the prescribed error is {value}: it must be above 0": "l'erreur prescrite est {value} : elle doit dépasser 0",
     "a relative error, e.g. 'PREC' 0.05 for 5 percent": "une erreur relative, par exemple 'PREC' 0.05 pour 5 pour cent",
     "TAILLE 'DIRECTION' is not available yet": "TAILLE 'DIRECTION' n'est pas encore disponible",

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.adapt import orders as orders_of
 from gibiane_ops.kernels.adapt import sizes
 from gibiane_ops.kernels.elements.table import shape
@@ -102,6 +103,11 @@ def test_size_map_keeps_its_promises():
     capped = sizes.size_map(points, blocks, error, 0.1, growth=None, max_count=50)
     assert capped.count == 50
     np.testing.assert_allclose(capped.nodal / free.nodal, (free.count / 50) ** (1 / 3))
+    assert sizes.size_map(points, blocks, error, 0.1, smallest=1e-9).reachable == 0.1
+    even = np.full_like(error, error.mean())
+    side = sizes.element_sizes(shape(blocks[0][0]), geometry.measures(shape(blocks[0][0]), points[blocks[0][1]]))
+    most = sizes.size_map(points, blocks, even, 0.1, smallest=float(side.max())).reachable
+    assert most == pytest.approx(np.sqrt((even**2 * (side.max() / side) ** 2).sum()), rel=1e-12)
     bounded = sizes.size_map(points, blocks, error, 0.1, smallest=0.3, largest=0.4)
     assert bounded.nodal.min() == 0.3
     assert bounded.nodal.max() == 0.4

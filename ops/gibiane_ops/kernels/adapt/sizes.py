@@ -243,12 +243,15 @@ class SizeMap:
         Number of elements of the optimum before growth, bounds and cap, ``sum r_E^-d``.
     ratios : (n_cells,) float64
         New over old size of each element.
+    reachable : float
+        Error expected when no size is below the smallest one: the target unless this limit acts.
     """
 
     nodal: FloatArray
     count: float
     optimum: float
     ratios: FloatArray
+    reachable: float
 
 
 def size_map(
@@ -328,6 +331,9 @@ def size_map(
     else:
         ratios = ratios_by_order(error2, target, orders, dim, equal=equal)
     optimum = float((ratios**-dim).sum())
+    possible = np.maximum(ratios, smallest / old)
+    within = bool((possible == ratios).all())
+    reachable = target if within else float(np.sqrt((possible ** (2 * orders) * error2).sum()))
     nodal = nodal_sizes(len(points), blocks, ratios * old, smallest_of_star=smallest_of_star, pairs=pairs)
     nodal *= (predicted_count(points, blocks, nodal) / optimum) ** (1 / dim)
     if growth is not None:
@@ -339,4 +345,4 @@ def size_map(
         nodal *= (count / max_count) ** (1 / dim)
         count = float(max_count)
     nodal[middles[:, 2]] = nodal[middles[:, :2]].mean(axis=1)
-    return SizeMap(nodal, count, optimum, ratios)
+    return SizeMap(nodal, count, optimum, ratios, reachable)
