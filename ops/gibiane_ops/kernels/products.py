@@ -8,6 +8,9 @@ import scipy.sparse as sp
 TINY = 1e-200
 """What stands for an entry of value zero, over the largest entry, while products are made."""
 
+FEW = 0.1
+"""Share of unknowns that follow others up to which the rest is better selected than multiplied."""
+
 
 def whole_product(B: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
     """Compute ``B.T K B`` with the zeros that K holds as entries, which SciPy's product leaves out.
@@ -26,10 +29,34 @@ def whole_product(B: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
     The unknowns of a node have one pattern as long as these zeros are there, and an ordering that finds this works on
     nodes: of 106 000 unknowns, in 0.8 s instead of 2.5.
 
+    Where most columns of B stand for one unknown each, as those of tied bodies do, their rows and columns of K are
+    taken as they are, and products are made of the few other unknowns only.
+
     Cost
     ----
-    Two products.
+    A selection of rows and columns, or two products.
     """
+    alone = np.flatnonzero(np.diff(B.indptr) == 1)
+    alone = alone[B.data[B.indptr[alone]] == 1.0]
+    own = np.full(B.shape[1], -1, np.int64)
+    own[B.indices[B.indptr[alone[::-1]]]] = alone[::-1]
+    rest = np.diff(B.indptr) > 0
+    rest[own[own >= 0]] = False
+    others = np.flatnonzero(rest)
+    if (own < 0).any() or len(others) > FEW * len(own):
+        return _product(B, K)
+    found = sp.csr_array(K[own][:, own])
+    if len(others):
+        found.data[found.data == 0] = np.finfo(np.float64).tiny  # sums leave zeros out too
+        follow, rows = sp.csr_array(B[others]), sp.csr_array(K[others])
+        cross = sp.csr_array(follow.T @ rows[:, own])
+        found = sp.csr_array(found + (cross + cross.T + follow.T @ rows[:, others] @ follow))
+    found.sort_indices()
+    return found
+
+
+def _product(B: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
+    """Multiply as a whole, tiny numbers in the place of zeros."""
     size = float(np.abs(K.data).max(initial=0.0)) or 1.0
     entries = np.where(K.data == 0, TINY * size, K.data)
     found = sp.csr_array(B.T @ sp.csr_array((entries, K.indices, K.indptr), shape=K.shape) @ B)

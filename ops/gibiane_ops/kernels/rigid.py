@@ -167,7 +167,7 @@ def free_motions(K: sp.sparray, points: FloatArray, C: sp.sparray) -> list[FreeM
     from scipy.sparse.csgraph import connected_components
 
     n, dim = points.shape
-    solid = _solids(sp.csr_array(K), n, dim)
+    solid = solids(sp.csr_array(K), n, dim)
     n_solids = int(solid.max(initial=-1)) + 1
     n_modes = 3 if dim == 2 else 6
     centres, radii, modes = _solid_modes(points, solid, n_solids)
@@ -191,8 +191,20 @@ def free_motions(K: sp.sparray, points: FloatArray, C: sp.sparray) -> list[FreeM
     return sorted(found, key=lambda motion: (motion.solids, bool(motion.rotation.any())))
 
 
-def _solids(K: sp.csr_array, n: int, dim: int) -> IntArray:
-    """Return the solid of each node, -1 where there is no stiffness."""
+def solids(K: sp.csr_array, n: int, dim: int) -> IntArray:
+    """Find the solids that a stiffness connects.
+
+    Parameters
+    ----------
+    K : (n * dim, n * dim) csr_array, symmetric
+    n, dim : int
+        Nodes, and unknowns of each.
+
+    Returns
+    -------
+    (n,) int64
+        Solid of each node, in the order of their first nodes; -1 where there is no stiffness.
+    """
     from scipy.sparse.csgraph import connected_components
 
     # The graph of the nodes: the components of one node belong together even where the matrix does not couple them.

@@ -188,7 +188,7 @@ def test_stall_falls_back_on_the_exact_stiffness(monkeypatch):
     load = bodies.load(B.F)
     gap = bodies.gaps(load)
     law = Friction.of(len(gap), 0.2)
-    monkeypatch.setattr(type(bodies.exact()), "learned", lambda self, dw, dy: self)
+    monkeypatch.setattr(type(bodies.exact()), "learned", lambda self, dw, dy, noise=0.0: self)
     bodies._exact = None
     monkeypatch.setattr("gibiane_ops.kernels.contact.correction.MOST", 3)
     monkeypatch.setattr("gibiane_ops.kernels.contact.correction.AGREEMENT", 1e-13)
@@ -249,3 +249,56 @@ def test_plan_by_size_and_memory(monkeypatch):
     assert plan(100_000, 8_000_000, 243, 3, wish="DIRE").method in ("auto", "single")
     assert plan(100_000, 8_000_000, 243, 3, coordinates=False).exact
     assert plan(100_000, 8_000_000, 243, 3, all_exact=True).exact
+
+
+def single_bodies():
+    B, _ = bodies_of("T1_1")
+    return B, condense(B.K, B.pairs, B.reduction, points=B.points, method="single")
+
+
+def test_a_factor_in_single_precision_gives_what_the_exact_stiffness_gives():
+    """One substitution a correction; what it leaves goes into the next, and nothing of it into the result."""
+    B, bodies = single_bodies()
+    assert bodies.factor.name == "single"
+    load = bodies.load(B.F)
+    gap = bodies.gaps(load)
+    for mu in (0.05, 0.2, 0.4):
+        law = Friction.of(len(gap), mu)
+        found = solve_corrected(bodies, load, gap, lambda i, law=law: solve_coulomb(i, law))
+        exact = solve_coulomb(B.interface, law)
+        assert np.abs(found.state.r - exact.r).max() <= 1e-8 * np.abs(exact.r).max()
+        assert np.abs(found.state.w - exact.w).max() <= 1e-8 * np.abs(exact.w).max()
+        u = B.interface.expand(exact.w)
+        assert np.abs(found.displacement - u).max() <= 1e-9 * np.abs(u).max()
+
+
+def test_repeated_coefficients_give_what_fresh_bodies_give():
+    """What the small model has learned from other coefficients changes the path, not the result."""
+    B, kept = single_bodies()
+    passes = []
+    for mu in (0.01, 0.1, 0.3, 0.5, 0.1):
+        states = []
+        for bodies in (kept, single_bodies()[1]):
+            load = bodies.load(B.F)
+            gap = bodies.gaps(load)
+            found = solve_corrected(bodies, load, gap, lambda i, mu=mu: solve_coulomb(i, mu))
+            states.append((found.state, found.corrections))
+        (one, few), (two, many) = states
+        assert np.array_equal(one.status, two.status)
+        assert np.abs(one.r - two.r).max() <= 1e-8 * np.abs(two.r).max()
+        assert np.abs(one.w - two.w).max() <= 1e-8 * np.abs(two.w).max()
+        assert few <= many
+        passes.append((few, many))
+    assert passes[-1][0] < passes[-1][1]
+
+
+def test_errors_of_a_solution_are_not_learned():
+    """A change of force below what may be wrong with it says nothing about the stiffness."""
+    B, bodies = bodies_of("T1_1")
+    bodies.small()
+    S = bodies.learned
+    rng = np.random.default_rng(3)
+    dw = S.still(rng.standard_normal(len(S.S)))
+    d = 1e-6 * (S.S @ dw)
+    assert S.learned(dw, S.S @ dw - d, float(np.linalg.norm(d))) is S
+    assert S.learned(dw, S.S @ dw - d, 1e-3 * float(np.linalg.norm(d))) is not S

@@ -18,6 +18,9 @@ NEGLIGIBLE = 1e-6
 ROUND_OFF = 1e-12
 """Nor is one that is smaller than this share of the force."""
 
+TRUST = 10.0
+"""Nor is one that is smaller than this many times the error of the solution that it comes from."""
+
 
 @dataclass(frozen=True, eq=False)
 class PairStiffness:
@@ -72,13 +75,15 @@ class PairStiffness:
         """Remove the part along the free motions, on which ``S w`` does no work."""
         return np.asarray(force - self.rigid @ (self.rigid.T @ force))
 
-    def learned(self, dw: FloatArray, dy: FloatArray) -> PairStiffness:
+    def learned(self, dw: FloatArray, dy: FloatArray, noise: float = 0.0) -> PairStiffness:
         """Make ``S dw = dy`` by a symmetric change of rank one (SR1).
 
         Parameters
         ----------
         dw, dy : (n d,) float64
             A change of w and that of ``S w`` with the exact S.
+        noise : float, force
+            Norm of what may be wrong with dy.
 
         Notes
         -----
@@ -89,6 +94,8 @@ class PairStiffness:
         dw = self.still(dw)
         d = self.still(self.S @ dw - dy)
         work, size = float(d @ dw), float(np.linalg.norm(d) * np.linalg.norm(dw))
+        if float(np.linalg.norm(d)) <= TRUST * noise:
+            return self
         if work <= NEGLIGIBLE * size or size <= ROUND_OFF * float(np.linalg.norm(dy) * np.linalg.norm(dw)):
             return self
         return replace(self, S=self.S - np.outer(d, d / work))

@@ -28,6 +28,7 @@ from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.errors import SingularSystem, TooLarge
 from gibiane_ops.kernels.packages import is_installed
 from gibiane_ops.kernels.products import whole_product
+from gibiane_ops.kernels.rigid import solids
 from gibiane_ops.kernels.solve import ITERATIVE, Factor
 
 BoolArray = NDArray[np.bool_]
@@ -287,8 +288,6 @@ class Condensation:
 
     def _coarse(self) -> sp.csr_array:
         """Interpolate the tied unknowns: those near the contact kept, the others on coarse grids."""
-        from scipy.sparse.csgraph import connected_components
-
         assert self._points is not None
         roots, d = self._fields.roots(), self.active.shape[1]
         Bv, Bw = self._fields.Bv, self._fields.Bw
@@ -296,8 +295,8 @@ class Condensation:
         near[Bv[np.flatnonzero(np.diff(Bw.indptr))].indices] = True
         near[np.flatnonzero(np.diff(self._Kvw.indptr))] = True
         roots = np.maximum(roots, 0)
-        body = connected_components(self._K, directed=False)[1].astype(np.int64)
-        return interpolation(self.tied.A, near, body[roots], self._points[roots // d], roots % d)
+        body = solids(self._K, self._K.shape[0] // d, d)
+        return interpolation(self.tied.A, near, body[roots // d], self._points[roots // d], roots % d)
 
 
 def condense(

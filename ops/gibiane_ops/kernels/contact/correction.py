@@ -20,17 +20,17 @@ from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged, StatusCy
 AGREEMENT = 1e-9
 """Largest difference between the forces of the small model and the true ones, over the largest force."""
 
-REST = 1e-11
-"""Norm of the forces that a solution with a factor in single precision may leave, over the largest force."""
-
-ROUGHEST = 1e-5
-"""Largest relative residual of such a solution: less would spoil what the small model learns from it."""
-
 LOOSE = 1e-9
 """Relative residual of the tied solution, for iterations, at which contact may stop."""
 
 MOST = 40
 """Corrections after which the loop is given up."""
+
+PARTLY = 1e-5
+"""Relative residual of a solution with a factor in single precision that suffices: one substitution, as a rule."""
+
+ENTIRELY = 1e-12
+"""And that of the result, over the load."""
 
 PATIENCE = 8
 """Corrections in a row without halving the best difference after which the loop is given up."""
@@ -154,9 +154,10 @@ def solve_corrected(
     -----
     The method finds ``S~ w = f~ + r`` with ``f~ = S~ w0 - S w0 + f``, w0 the displacement before; one tied solution
     gives ``S w``, and a change of rank one makes ``S~ w`` exact. S~ is never less stiff than S, and equals it after at
-    most as many corrections as there are components. With a factor f~ is f at every pass. What iterations leave of a
-    solution goes into the next, and the small model removes its smooth part, rigid motions above all: the forces then
-    have no work on free motions, without which a body without friction would drift.
+    most as many corrections as there are components. With an exact factor f~ is f at every pass. What iterations leave
+    of a solution goes into the next (a factor in single precision iterates like multigrid, but far faster), a change of
+    w that these rests could hide is not learned from, and with multigrid the small model removes its smooth part, rigid
+    motions above all: the forces then have no work on free motions, without which a body without friction would drift.
 
     Cost
     ----
@@ -164,12 +165,11 @@ def solve_corrected(
     """
     bodies.small()
     assert bodies.learned is not None
-    size = len(load.f)
-    w, x, y = np.zeros(size), np.zeros(len(load.x)), np.zeros(size)
+    follower = _Follower(bodies, load)
     differences: list[float] = []
     before: ContactState | None = None
     left = 0.0
-    interface = _around(bodies, load, gap, w, y)
+    interface = follower.interface(gap)
     while True:
         if again is None or before is None:
             state = run(interface)
@@ -177,17 +177,17 @@ def solve_corrected(
             state = again(interface, before)
             state = replace(state, history=[*before.history, *state.history])
         before = state
-        new_w = state.w.ravel()
-        scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
-        x, y_new = _true_force(bodies, new_w, w, x, y, rest=REST * scale)
-        bodies.learned = bodies.learned.learned(new_w - w, y_new - y)
-        true = y_new - load.f
-        active = bodies.active.ravel()
-        differences.append(float(np.abs(true - state.r.ravel())[active].max(initial=0)) / scale)
-        w, y = new_w, y_new
+        w, y, rest = follower.w, follower.y, follower.rest
+        follower.move(state.w.ravel())
+        bodies.learned = bodies.learned.learned(
+            follower.w - w, follower.y - y, float(np.linalg.norm(rest) + np.linalg.norm(follower.rest))
+        )
+        differences.append(_difference(bodies, load, interface, state, follower.y))
+        if differences[-1] <= AGREEMENT and follower.settle():
+            differences[-1] = _difference(bodies, load, interface, state, follower.y)
         if tell is not None:
             tell(len(differences), differences[-1])
-        interface = _around(bodies, load, gap, w, y)
+        interface = follower.interface(gap)
         if differences[-1] <= AGREEMENT:
             break
         if enough:
@@ -200,11 +200,19 @@ def solve_corrected(
             len(differences) > PATIENCE and min(recent) > 0.5 * min(differences[:-PATIENCE])
         ):
             raise Stalled(differences, state)
-    x = _settled(bodies, load, w, x)
+    follower.settle()
     report = replace(state.report, balance=max(state.report.balance, differences[-1]))
-    displacement = bodies.displacement(load, w, x)
-    bodies.remember(w, x)
+    displacement = bodies.displacement(load, follower.w, follower.x)
+    bodies.remember(follower.w, follower.x)
     return Corrected(replace(state, report=report), interface, displacement, len(differences), False, left)
+
+
+def _difference(
+    bodies: Condensation, load: TiedSolution, interface: Interface, state: ContactState, y: FloatArray
+) -> float:
+    """Measure the true forces against those of the state, over the largest."""
+    scale = max(float(np.abs(state.r).max(initial=0)), interface.force_scale) or 1.0
+    return float(np.abs(y - load.f - state.r.ravel())[bodies.active.ravel()].max(initial=0)) / scale
 
 
 def solve_stuck(bodies: Condensation, load: TiedSolution, gap: FloatArray) -> Corrected:
@@ -226,42 +234,76 @@ def solve_stuck(bodies: Condensation, load: TiedSolution, gap: FloatArray) -> Co
     return Corrected(solve_tied(interface), interface, displacement, 0, False)
 
 
-def _around(bodies: Condensation, load: TiedSolution, gap: FloatArray, w: FloatArray, y: FloatArray) -> Interface:
-    """Put together the interface whose force on w is the true one, ``y - f``."""
-    learned = bodies.learned
-    assert learned is not None
-    f = load.f if bodies.tied.direct else learned.still(learned.S @ w - y) + load.f
-    return replace(bodies.interface_of(load, learned, gap), f=f)
+class _Follower:
+    """The bodies themselves, that follow the relative displacements of the small model.
 
+    Attributes
+    ----------
+    w : (n d,) float64
+        Relative displacements so far.
+    x : (n_v,) float64
+        Solution of ``Kvv x = Kvw w``, but for ``rest``.
+    y : (n d,) float64
+        ``S w``.
+    rest : (n_v,) float64
+        What is left of the equations of x; each solution takes the rest of the one before with it.
+    """
 
-def _true_force(
-    bodies: Condensation, w: FloatArray, w_before: FloatArray, x_before: FloatArray, y_before: FloatArray, rest: float
-) -> tuple[FloatArray, FloatArray]:
-    """Solve ``Kvv x = Kvw w`` once, from the x before, and give x and ``S w``; a factor leaves less than the rest."""
-    assert bodies.learned is not None
-    if bodies.tied.direct:
-        # of the change alone: round-off of a body that has slid far would hide the last corrections
-        dw = w - w_before
-        right = bodies.coupling(dw)
-        size = float(np.linalg.norm(right))
-        dx = bodies.tied.once(right, min(rest / size, ROUGHEST) if size else None)
-        return x_before + dx, y_before + bodies.learned.still(bodies.force(dw, dx))
-    right = bodies.coupling(w)
-    x = x_before if x_before.any() else bodies.recalled(w)
-    x = x + bodies.tied.once(right - bodies.tied.A @ x)
-    x = x + bodies.small().solve(right - bodies.tied.A @ x)
-    return x, bodies.learned.still(bodies.force(w, x))
+    def __init__(self, bodies: Condensation, load: TiedSolution) -> None:
+        self._bodies, self._load = bodies, load
+        self._tied = bodies.tied
+        self._size = float(np.linalg.norm(self._tied.A @ load.x))
+        self.w, self.y = np.zeros(len(load.f)), np.zeros(len(load.f))
+        self.x, self.rest = np.zeros(len(load.x)), np.zeros(len(load.x))
 
+    def interface(self, gap: FloatArray) -> Interface:
+        """Put together the interface whose force on w is the true one, ``y - f``."""
+        learned = self._bodies.learned
+        assert learned is not None
+        f = self._load.f
+        if not self._tied.exact:
+            f = learned.still(learned.S @ self.w - self.y) + f
+        return replace(self._bodies.interface_of(self._load, learned, gap), f=f)
 
-def _settled(bodies: Condensation, load: TiedSolution, w: FloatArray, x: FloatArray) -> FloatArray:
-    """Go on with the iterations until the displacement is as accurate as the forces."""
-    if bodies.tied.direct:
-        return x
-    right = bodies.coupling(w)
-    size = max(float(np.linalg.norm(right)), float(np.linalg.norm(bodies.tied.A @ load.x)))
-    for _ in range(PASSES):
-        rest = right - bodies.tied.A @ x
-        if float(np.linalg.norm(rest)) <= LOOSE * size:
-            break
-        x = x + bodies.tied.once(rest)
-    return x
+    def move(self, w: FloatArray) -> None:
+        """Go to w with one solution, which takes the rest of the one before with it."""
+        bodies, tied = self._bodies, self._tied
+        assert bodies.learned is not None
+        if tied.direct:
+            # of the change alone: round-off of a body that has slid far would hide the last corrections
+            dw = w - self.w
+            self.rest = self.rest + bodies.coupling(dw)
+            self.w = w
+            self._correct(dw, PARTLY)
+            return
+        right = bodies.coupling(w)
+        if not self.x.any():
+            self.x = bodies.recalled(w)
+        x = self.x + tied.once(right - tied.A @ self.x)
+        x = x + bodies.small().solve(right - tied.A @ x)
+        self.w, self.x, self.rest = w, x, right - tied.A @ x
+        self.y = bodies.learned.still(bodies.force(w, x))
+
+    def settle(self) -> bool:
+        """Solve for the rest, until the displacement is as accurate as the forces; tell whether it was not."""
+        tied = self._tied
+        size = max(float(np.linalg.norm(self._bodies.coupling(self.w))), self._size)
+        wanted = ENTIRELY if tied.direct else LOOSE
+        for count in range(PASSES):
+            if float(np.linalg.norm(self.rest)) <= wanted * size:
+                return count > 0
+            if tied.direct:
+                self._correct(np.zeros(len(self.w)), wanted * size / float(np.linalg.norm(self.rest)))
+            else:
+                dx = tied.once(self.rest)
+                self.x, self.rest = self.x + dx, self.rest - tied.A @ dx
+        return True
+
+    def _correct(self, dw: FloatArray, tolerance: float) -> None:
+        """Solve for the rest, to a relative residual, and add a change of w whose force the rest holds."""
+        dx = self._tied.once(self.rest, tolerance)
+        self.x = self.x + dx
+        self.rest = self.rest - self._tied.A @ dx
+        learned = self._bodies.learned
+        assert learned is not None
+        self.y = self.y + learned.still(self._bodies.force(dw, dx))

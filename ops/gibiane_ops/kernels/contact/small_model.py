@@ -129,10 +129,12 @@ def interpolation(A: sp.csr_array, near: BoolArray, body: IntArray, points: Floa
     Multilinear functions on the box around each body; they reproduce rigid motions. The unknowns within ``RINGS``
     layers of the contact are kept.
     """
-    pattern = sp.csr_array((np.ones(len(A.data), np.int8), A.indices, A.indptr), A.shape)
-    kept = near.copy()
+    kept, front = near.copy(), near
     for _ in range(RINGS):
-        kept |= np.asarray(pattern @ kept.astype(np.int32)) > 0
+        reached = np.zeros(len(near), bool)
+        reached[A[np.flatnonzero(front)].indices] = True
+        front = reached & ~kept
+        kept |= reached
     own = np.flatnonzero(kept)
     rows, columns, values = [own], [np.arange(len(own))], [np.ones(len(own))]
     start = len(own)

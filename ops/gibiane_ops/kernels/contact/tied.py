@@ -47,10 +47,15 @@ class TiedSolver:
         """Whether a factor gives exact solutions."""
         return self.factor.name not in ITERATIVE
 
+    @property
+    def exact(self) -> bool:
+        """Whether one solution leaves no more than round-off."""
+        return self.direct and self.factor.name != "single"
+
     def once(self, b: FloatArray, tolerance: float | None = None) -> FloatArray:
         """Solve exactly with a factor, to the relative residual ``PASS`` by iterations.
 
-        A factor in single precision is corrected to the tolerance, if one is given.
+        What iterates, a factor in single precision too, stops at the tolerance if one is given.
         """
         start = time.perf_counter()
         if self._place is None:
@@ -58,7 +63,7 @@ class TiedSolver:
         else:
             padded = np.zeros((self.factor.shape[0], *b.shape[1:]))
             padded[self._place] = b
-            x = np.asarray(self.factor.solve(padded)[self._place])
+            x = np.asarray(self.factor.solve(padded, tolerance)[self._place])
         self.seconds = min(self.seconds, time.perf_counter() - start)
         self.passes += 1
         self.iterations += self.factor.iterations
