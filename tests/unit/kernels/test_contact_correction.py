@@ -267,7 +267,7 @@ def test_a_factor_in_single_precision_gives_what_the_exact_stiffness_gives():
         found = solve_corrected(bodies, load, gap, lambda i, law=law: solve_coulomb(i, law))
         exact = solve_coulomb(B.interface, law)
         assert np.abs(found.state.r - exact.r).max() <= 1e-8 * np.abs(exact.r).max()
-        assert np.abs(found.state.w - exact.w).max() <= 1e-8 * np.abs(exact.w).max()
+        assert np.abs(found.state.w - exact.w).max() <= 1e-8 * B.interface.length_scale
         u = B.interface.expand(exact.w)
         assert np.abs(found.displacement - u).max() <= 1e-9 * np.abs(u).max()
 
@@ -286,7 +286,7 @@ def test_repeated_coefficients_give_what_fresh_bodies_give():
         (one, few), (two, many) = states
         assert np.array_equal(one.status, two.status)
         assert np.abs(one.r - two.r).max() <= 1e-8 * np.abs(two.r).max()
-        assert np.abs(one.w - two.w).max() <= 1e-8 * np.abs(two.w).max()
+        assert np.abs(one.w - two.w).max() <= 1e-8 * B.interface.length_scale
         assert few <= many
         passes.append((few, many))
     assert passes[-1][0] < passes[-1][1]
@@ -294,7 +294,7 @@ def test_repeated_coefficients_give_what_fresh_bodies_give():
 
 def test_errors_of_a_solution_are_not_learned():
     """A change of force below what may be wrong with it says nothing about the stiffness."""
-    B, bodies = bodies_of("T1_1")
+    bodies = bodies_of("T1_1")[1]
     bodies.small()
     S = bodies.learned
     rng = np.random.default_rng(3)
