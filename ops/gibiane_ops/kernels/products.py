@@ -43,23 +43,21 @@ def whole_product(B: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
     rest = np.diff(B.indptr) > 0
     rest[own[own >= 0]] = False
     others = np.flatnonzero(rest)
-    if (own < 0).any() or len(others) > FEW * len(own):
-        return _product(B, K)
-    found = sp.csr_array(K[own][:, own])
-    if len(others):
-        found.data[found.data == 0] = np.finfo(np.float64).tiny  # sums leave zeros out too
-        follow, rows = sp.csr_array(B[others]), sp.csr_array(K[others])
-        cross = sp.csr_array(follow.T @ rows[:, own])
-        found = sp.csr_array(found + (cross + cross.T + follow.T @ rows[:, others] @ follow))
-    found.sort_indices()
-    return found
-
-
-def _product(B: sp.csr_array, K: sp.csr_array) -> sp.csr_array:
-    """Multiply as a whole, tiny numbers in the place of zeros."""
     size = float(np.abs(K.data).max(initial=0.0)) or 1.0
-    entries = np.where(K.data == 0, TINY * size, K.data)
-    found = sp.csr_array(B.T @ sp.csr_array((entries, K.indices, K.indptr), shape=K.shape) @ B)
+    if (own < 0).any() or len(others) > FEW * len(own):
+        whole = _marked(sp.csr_array(K), size)
+        found = sp.csr_array(B.T @ whole @ B)
+    else:
+        found = sp.csr_array(K[own][:, own])
+        if len(others):
+            found, follow, rows = _marked(found, size), sp.csr_array(B[others]), _marked(sp.csr_array(K[others]), size)
+            cross = sp.csr_array(follow.T @ rows[:, own])
+            found = sp.csr_array(found + (cross + cross.T + follow.T @ rows[:, others] @ follow))
     found.data[np.abs(found.data) <= 1e10 * TINY * size] = 0.0
     found.sort_indices()
     return found
+
+
+def _marked(A: sp.csr_array, size: float) -> sp.csr_array:
+    """Put tiny numbers in the place of the zeros, which products and sums leave out."""
+    return sp.csr_array((np.where(A.data == 0, TINY * size, A.data), A.indices, A.indptr), shape=A.shape)
