@@ -96,7 +96,7 @@ def test_penalty_errors(g):
 @pytest.mark.parametrize("mu", [0.001, 0.01, 0.1, 1.0])
 @pytest.mark.parametrize("scene", ["T1_1h", "T1_2h", "T4_2h"])
 def test_penalty_on_an_opening_contact_converges_by_its_own_steps_or_says_so(scene, mu):
-    # full steps and damped ones may both go round in circles: nothing borrowed from another method hides it
+    # full steps go round in circles where friction is weak: damped ones of limited length settle, nothing is borrowed
     interface, outcomes, histories = blocks(scene).interface, [], []
     for g in 10.0 ** np.arange(-2, 7, 2):
         try:
@@ -110,17 +110,22 @@ def test_penalty_on_an_opening_contact_converges_by_its_own_steps_or_says_so(sce
             # normal forces are those of the springs at the penetration found
             push = -g * interface.kref * np.maximum(found.w[:, 0] - interface.gap, 0.0)
             np.testing.assert_allclose(found.r[:, 0], push, atol=1e-7 * interface.force_scale)
-    assert any(outcomes) or mu == 0.001
     assert all(history[-1] > 1e-10 for history in histories)
-    if (scene, mu) == ("T1_1h", 0.01):
-        assert not all(outcomes)
+    assert any(outcomes) or mu == 0.001
+    assert all(outcomes) or mu == 0.001 or scene != "T1_1h"
 
 
 @pytest.mark.parametrize("method", ["penalty", "uzawa"])
-def test_weak_friction_on_an_opening_contact_defeats_a_stiff_penalty(method):
-    solve = solve_penalty if method == "penalty" else solve_uzawa
+def test_weak_friction_on_an_opening_contact_needs_short_steps(method):
+    interface = blocks("T1_1h").interface
+    exact = solve_coulomb(interface, 0.01)
+    found = (solve_penalty if method == "penalty" else solve_uzawa)(interface, 0.01, 1e4)
+    np.testing.assert_allclose(found.r, exact.r, atol=(1e-3 if method == "penalty" else 1e-6) * np.abs(exact.r).max())
+
+
+def test_newton_without_safeguard_says_that_it_cycles_on_an_opening_contact():
     with pytest.raises(NotConverged) as caught:
-        solve(blocks("T1_1h").interface, 0.01, 1e4)
+        solve_augmented_newton(blocks("T1_1h").interface, 0.01, 1e4)
     assert caught.value.history[-1] > 1e-3
 
 

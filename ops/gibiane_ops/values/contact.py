@@ -181,7 +181,11 @@ def nodal_property(ctx: Context, values: ChamZone | None, name: str, nodes: IntA
 def zone_gap(ctx: Context, zone: ContactZone, values: ChamZone | None, pairs: ContactPairs) -> FloatArray:
     """Return the initial gaps of the pairs of a zone: those of MATE 'JEU', else of the geometry."""
     nodal = nodal_property(ctx, values, "JEU", pairs.pairs[:, 0])
-    return pairs.gap if nodal is None else pairs.on_pairs(nodal)
+    if nodal is None:
+        return pairs.gap
+    # the changed basis of quadratic facets lowers a bent gap at the middles: a gap that is not negative is no overlap
+    moved = pairs.on_pairs(nodal)
+    return np.where(nodal >= 0, np.maximum(moved, 0.0), moved)
 
 
 def zone_friction(ctx: Context, zone: ContactZone, values: ChamZone | None, pairs: ContactPairs) -> Friction:

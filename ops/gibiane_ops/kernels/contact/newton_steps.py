@@ -20,6 +20,9 @@ SOFT_GAMMA = 1e-3
 _STALL = 8
 """Full steps without a better residual after which another attempt is made."""
 
+_REACH = 1.0
+"""Largest damped step, over the displacements and the natural length."""
+
 _MEMORY = 4
 """A damped step must improve on the worst of the last few residuals, not on the last one."""
 
@@ -87,7 +90,11 @@ def newton_steps(
         except np.linalg.LinAlgError:
             break
         t = 1.0
-        while damped and t >= 1e-3:
+        if damped:
+            # where every pair slips a free body is not held, and the step along its motion has no end
+            t = min(1.0, _REACH * (1 + float(np.abs(w).max(initial=0))) / (float(np.abs(dw).max(initial=0)) or 1.0))
+        smallest = 1e-3 * t
+        while damped and t >= smallest:
             if _energy(problem, w + t * dw, r + t * dr) <= (1 - 1e-4 * t) * max(recent):
                 break
             t /= 2

@@ -58,8 +58,8 @@ def solve_penalty(
     ``r = law(-g (w - gap n))``: normal force ``-g`` times the penetration, tangential force ``-g w_t`` cut at the
     bound. The error of displacements and forces is proportional to 1/g; the conditioning of the unreduced matrix
     ``K + g C^T C`` grows like g, which on the condensed interface costs nothing: 1e4 to 1e6 leave 4 to 6 digits. A g
-    below 1 gives a wrong answer with an excellent residual. Where friction is weak and the contact opens, both kinds of
-    steps may go round in circles: nothing else is tried, and the method says that it has not converged.
+    below 1 gives a wrong answer with an excellent residual. Where friction is weak and the contact opens, full
+    steps go round in circles and damped ones of limited length follow; nothing else is tried.
 
     Source
     ------
