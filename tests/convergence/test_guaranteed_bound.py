@@ -5,6 +5,7 @@ with two planes of symmetry, cut into tetrahedra. Energies of the exact solution
 bricks extrapolated, down to 3 and 6 mm (known to 0.07 and 0.0002 %).
 """
 
+import io
 from functools import lru_cache
 from itertools import permutations
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from gibiane import Session
 from gibiane_ops.kernels.assembly import assemble, element_stiffness, strains, stresses
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
@@ -152,6 +154,7 @@ def effectivity(of, found, exact, contact=0.0):
     [
         (200.0, 100.0), (200.0, 50.0), (50.0, 25.0),
         pytest.param(200.0, 25.0, marks=pytest.mark.slow), pytest.param(50.0, 12.5, marks=pytest.mark.slow),
+        pytest.param(50.0, 25.0 / 3, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_bonded_blocks(side, h):
@@ -166,7 +169,7 @@ def test_bonded_blocks(side, h):
     assert 4 * found.energy.sum() < BONDED[side] < 4 * (found.energy.sum() + found.total**2)
 
 
-@pytest.mark.parametrize("h", [25.0, pytest.param(12.5, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("h", [25.0, *(pytest.param(h, marks=pytest.mark.slow) for h in (12.5, 25.0 / 3))])
 def test_blocks_without_friction(h):
     of = scene(50.0, h, False)
     u, state = of.contact(0.0)
@@ -185,6 +188,51 @@ def test_blocks_without_friction(h):
     if h < 20:
         fixed = of.estimate(u, of.with_contact(pressures), sweeps=1)
         assert fixed.total > 1.1 * found.total
+
+
+TRESCA = """
+OPTI DIME 2 ELEM QUA4 MODE PLAN DEFO ;
+DEBP BLOCS N*ENTIER ;
+  T = TABLE ; S1 = (DROI N (0. 0.) (1. 0.)) TRAN N (0. 1.) ; S2 = (DROI N (0. -1.) (1. -1.)) TRAN N (0. 1.) ;
+  T1 = CHAN TRI3 S1 ; T2 = CHAN TRI3 S2 ; MO = (MODE T1 'MECANIQUE' 'ELASTIQUE') ET (MODE T2 'MECANIQUE' 'ELASTIQUE') ;
+  MA = (MATE (REDU MO T1) 'YOUN' 1. 'NU' 0.3) ET (MATE (REDU MO T2) 'YOUN' 10. 'NU' 0.1) ;
+  CL = (BLOQ 'DEPL' (COTE 1 S2)) ET (BLOQ 'UX' (COTE 4 S1)) ET (BLOQ 'UX' (COTE 4 S2)) ;
+  MC = MODE (COTE 3 S2) (COTE 1 S1) 'CONTACT' 'FROTTANT' 'TRESCA' ; MATC = MATE MC 'SEUI' SEUIL ; RC J = RIGI MC MATC ;
+  U = RESO ((RIGI MO MA) ET CL ET RC) ((PRES 'MASS' MO 1.E-2 (COTE 3 S1)) ET J) ; REA = REAC RC U ;
+  SIG = SIGM MO MA U ; T.'E' = ERREUR 'CONTACT' 'RDC' 'TABL' MO SIG MA MC MATC U REA CL 'PRES' 1.E-2 (COTE 3 S1) ;
+  T.'U' = U ; T.'MO' = MO ; T.'MA' = MA ; T.'T1' = T1 ; T.'T2' = T2 ; T.'ETAT' = EXCO 'ETAT' (COFR MC MATC U REA) ;
+FINP T ;
+TC = BLOCS 6 ; TF = BLOCS 24 ; L = MOTS 'T1' 'T2' ; EN = 0. ;
+REPE B 2 ;
+  GF = TF.(EXTR L &B) ; GC = TC.(EXTR L &B) ; M1 = REDU (TF.'MO') GF ; UC = REDU (TC.'U') GC ;
+  D = (REDU (TF.'U') GF) - (PROI GF (CHAN 'CHAM' UC (REDU (TC.'MO') GC))) ;
+  EN = EN + (INTG M1 (ENER M1 (SIGM M1 (TF.'MA') D) (EPSI M1 D))) ;
+FIN B ;
+SURE = (TC.'E'.'GARANTI') ET (TF.'E'.'GARANTI') ; EC = TC.'E'.'ABSOLUE' ; EF = TF.'E'.'ABSOLUE' ;
+BAS = MINI (TC.'ETAT') ; HAUT = MAXI (TC.'ETAT') ;
+"""
+
+
+@pytest.mark.parametrize(
+    ("threshold", "states", "most"),
+    [
+        (5e-4, (1, 2), 1.2),
+        pytest.param(1e-4, (1, 2), 1.2, marks=pytest.mark.slow), pytest.param(2e-3, (1, 2), 1.2, marks=pytest.mark.slow),
+        # tractions that stick are not improved, only pressures are
+        pytest.param(1.0, (1, 1), 1.5, marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
+def test_threshold_of_tresca(threshold, states, most):
+    # Sliding here and there, nearly everywhere, nearly nowhere, and nowhere.
+    out = io.StringIO()
+    session = Session(out=out, err=out)
+    session.globals.names["SEUIL"] = threshold
+    assert session.run_text(TRESCA) == 0, out.getvalue()
+    found = session.names()
+    assert found["SURE"]
+    assert (found["BAS"], found["HAUT"]) == states
+    # Both meshes have about one theta: |u - u_h|^2 = |u_f - u_h|^2 + |u - u_f|^2, theta^2 = (EC^2 - EF^2) / EN.
+    assert 1 <= np.sqrt((found["EC"] ** 2 - found["EF"] ** 2) / found["EN"]) <= most
 
 
 def test_slips_of_several_directions_leave_no_admissible_traction():
