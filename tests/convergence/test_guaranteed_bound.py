@@ -217,7 +217,8 @@ BAS = MINI (TC.'ETAT') ; HAUT = MAXI (TC.'ETAT') ;
     ("threshold", "states", "most"),
     [
         (5e-4, (1, 2), 1.2),
-        pytest.param(1e-4, (1, 2), 1.2, marks=pytest.mark.slow), pytest.param(2e-3, (1, 2), 1.2, marks=pytest.mark.slow),
+        pytest.param(1e-4, (1, 2), 1.2, marks=pytest.mark.slow),
+        pytest.param(2e-3, (1, 2), 1.2, marks=pytest.mark.slow),
         # tractions that stick are not improved, only pressures are
         pytest.param(1.0, (1, 1), 1.5, marks=pytest.mark.slow),
     ],
