@@ -147,11 +147,17 @@ def test_an_iteration_against_its_factorisation(bench, sizes):
                 scene.K, scene.pairs, scene.reduction, points=scene.points
             ).exact(),
         }
-        step = lambda problem=problem, w=w, r=r: problem.step(w, r)  # noqa: E731
+
+        def step(problem=problem, w=w, r=r):
+            return problem.step(w, r)
+
         bench.compare("one iteration on the condensed interface", f"T1 {n}", step, peers, rounds=5)
         share = bench.rows[-2]["ours"] / bench.rows[-2]["peer_time"]
         bench.notes.append(f"T1 {n}: one contact iteration costs {share:.3%} of the factorisation of the tied solids")
-        estimate = lambda interface=interface, state=state: solver_error(interface, state)  # noqa: E731
+
+        def estimate(interface=interface, state=state):
+            return solver_error(interface, state)
+
         bench.compare("estimate of the solver error", f"T1 {n}", estimate, peers, rounds=5)
 
 

@@ -172,7 +172,10 @@ def test_conditioning_of_a_model_of_two_nodes(r):
         # w = u1 - u2 with v = u2: v (k1 + k2) = F1 + F2 - k1 w
         f = F[:2] - (F[:2] + F[2:]) / 3
         total = (F[:2] + F[2:]) / 3
-        expand = lambda w: np.concatenate([total + 2 * w.ravel() / 3, total - w.ravel() / 3])  # noqa: E731
+
+        def expand(w):
+            return np.concatenate([total + 2 * w.ravel() / 3, total - w.ravel() / 3])
+
         return replace(bare_interface(S, f, 2), expander=expand)
 
     closed = solve_coulomb(bare_interface(S, np.array([1.0, 0.1]), 2), 0.5)

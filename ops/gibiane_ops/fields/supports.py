@@ -10,6 +10,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
 from gibiane.values import CHPOINT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT
 from gibiane_ops.fields.components import rename, with_nature
+from gibiane_ops.fields.making import mesh_zones
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery import nodal_mean
@@ -94,16 +95,16 @@ def _to_support(ctx: Context, support: str, model: Modele, field: MChaml, subtyp
 @CHAN.form(
     Key("CHAM", "an element field", required=True),
     Arg("field", CHPOINT, "nodal field"),
-    Arg("model", MMODEL, "model"),
+    Arg("model", (MMODEL, MAILLAGE), "model, or mesh"),
     Key(SUPPORTS, "where the values shall stand (nodes)", name="support"),
     TYPE,
     gives=[MCHAML],
 )
 def _to_elements(
-    ctx: Context, cham: bool, field: ChPoint, model: Modele, support: str | None, subtype: str | None
+    ctx: Context, cham: bool, field: ChPoint, model: Modele | Maillage, support: str | None, subtype: str | None
 ) -> MChaml:
     zones = []
-    for zone in field_zones(ctx, model):
+    for zone in mesh_zones(ctx, model) if isinstance(model, Maillage) else field_zones(ctx, model):
         nodal = field.table(field.names, zone.cells.ravel()).reshape(*zone.cells.shape, len(field.names))
         zones.append(ChamZone(zone, field.names, moved(shape(zone.shape), nodal, "NOEUD", support or "NOEUD")))
     return MChaml(zones, subtype.strip() if subtype else SCALAIRE, support or "NOEUD", field.title)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,13 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import FLOTTANT, MAILLAGE, POINT
+from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.mesh import arcs, curves
 from gibiane_ops.mesh.building import dimension, explained, nodes_of, places_along
 from gibiane_ops.mesh.paths import COUNT, DFIN, DINI, ENDS, End, end_sizes, first_node, last_node, line_along
 from gibiane_ops.values.maillage import Maillage, Point
 
+Path = Callable[[FloatArray], FloatArray]
 _COMMON = " N, densities and lines in place of end points as in DROIT."
 CER3 = operator(
     "CER3",
@@ -37,23 +40,33 @@ CER3 = operator(
 def _cer3(
     ctx: Context, n: int | None, a: End, c: Point, b: End | None, dini: float | None, dfin: float | None
 ) -> Maillage:
-    start, end = _ends(ctx, a, b)
-    store = nodes_of(ctx)
-    sizes = end_sizes(ctx, start, end, dini, dfin)
-    arc = arcs.through(store.coords[start], c.coords, store.coords[end])
-    if arc is None:
-        ctx.fail(
-            21, "the three points are on one line: no circle passes through them", hint="DROIT makes a straight line"
-        )
-    return line_along(ctx, a, b, start, end, arc, places_along(ctx, arc.length, *sizes, n), sizes)
+    def arc(start: FloatArray, end: FloatArray) -> tuple[Path, float]:
+        found = arcs.through(start, c.coords, end)
+        if found is None:
+            hint = "DROIT makes a straight line"
+            ctx.fail(21, "the three points are on one line: no circle passes through them", hint=hint)
+        return found, found.length
+
+    return _drawn(ctx, a, b, (n, dini, dfin), arc)
 
 
-def _ends(ctx: Context, a: End, b: End | None) -> tuple[int, int]:
-    """Return the two end nodes of a curve; without the second, the first of the line that is prolonged."""
+def _drawn(
+    ctx: Context,
+    a: End,
+    b: End | None,
+    spacing: tuple[int | None, float | None, float | None],
+    curve: Callable[[FloatArray, FloatArray], tuple[Path, float]],
+) -> Maillage:
+    """Mesh a curve given by its ends: its path and length. Without the second end the line a is closed on its start."""
     dimension(ctx)
     if b is None and isinstance(a, Point):
         ctx.fail(37, "no POINT for its other end", at="a", label="one end only")
-    return last_node(ctx, a, "a"), first_node(ctx, a if b is None else b, "b")
+    start, end = last_node(ctx, a, "a"), first_node(ctx, a if b is None else b, "b")
+    x = nodes_of(ctx).coords
+    n, dini, dfin = spacing
+    sizes = end_sizes(ctx, start, end, dini, dfin)
+    path, length = curve(x[start], x[end])
+    return line_along(ctx, a, b, start, end, path, places_along(ctx, length, *sizes, n), sizes)
 
 
 PARA = operator(
@@ -79,12 +92,12 @@ PARA = operator(
 def _parabole(
     ctx: Context, n: int | None, a: End, tip: Point, b: End | None, dini: float | None, dfin: float | None
 ) -> Maillage:
-    start, end = _ends(ctx, a, b)
-    x = nodes_of(ctx).coords
-    sizes = end_sizes(ctx, start, end, dini, dfin)
-    with explained(ctx, "tip"):
-        curve = curves.parabola(x[start], tip.coords, x[end])
-    return line_along(ctx, a, b, start, end, curve.by_length, places_along(ctx, curve.length, *sizes, n), sizes)
+    def parabola(start: FloatArray, end: FloatArray) -> tuple[Path, float]:
+        with explained(ctx, "tip"):
+            found = curves.parabola(start, tip.coords, end)
+        return found.by_length, found.length
+
+    return _drawn(ctx, a, b, (n, dini, dfin), parabola)
 
 
 CUBP = operator(
@@ -117,12 +130,12 @@ def _cubp(
     dini: float | None,
     dfin: float | None,
 ) -> Maillage:
-    start, end = _ends(ctx, p1, p4)
-    sizes = end_sizes(ctx, start, end, dini, dfin)
-    with explained(ctx, "p2"):
-        curve = curves.cubic_through(np.array([p.coords for p in (p1, p2, p3, p4)]))
-    path = curve.by_length if unif else curve.by_parameter
-    return line_along(ctx, p1, p4, start, end, path, places_along(ctx, curve.length, *sizes, n), sizes)
+    def cubic(start: FloatArray, end: FloatArray) -> tuple[Path, float]:
+        with explained(ctx, "p2"):
+            found = curves.cubic_through(np.array([start, p2.coords, p3.coords, end]))
+        return found.by_length if unif else found.by_parameter, found.length
+
+    return _drawn(ctx, p1, p4, (n, dini, dfin), cubic)
 
 
 CUBT = operator(
@@ -149,11 +162,12 @@ CUBT = operator(
 def _cubt(
     ctx: Context, n: int | None, p1: Point, v1: Point, v2: Point, p2: Point, dini: float | None, dfin: float | None
 ) -> Maillage:
-    start, end = _ends(ctx, p1, p2)
-    sizes = end_sizes(ctx, start, end, dini, dfin)
-    with explained(ctx, "p2"):
-        curve = curves.hermite(p1.coords, v1.coords, v2.coords, p2.coords)
-    return line_along(ctx, p1, p2, start, end, curve.by_length, places_along(ctx, curve.length, *sizes, n), sizes)
+    def cubic(start: FloatArray, end: FloatArray) -> tuple[Path, float]:
+        with explained(ctx, "p2"):
+            found = curves.hermite(start, v1.coords, v2.coords, end)
+        return found.by_length, found.length
+
+    return _drawn(ctx, p1, p2, (n, dini, dfin), cubic)
 
 
 COUR = operator(

@@ -12,7 +12,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, EVOLUTIO, FLOTTANT, MOT, TABLE, Table
 from gibiane_ops.kernels.plot import Curve, draw_curves
-from gibiane_ops.output.targets import colour, draw, title
+from gibiane_ops.output.targets import draw, ink, title
 from gibiane_ops.values.evolution import Evolution
 
 SWITCHES = ("LOGX", "LOGY", "CARR", "MIMA", "GRIL", "GRIS", "AXES", "SEPA", "NCLK", "DATE", "LOGO")
@@ -133,7 +133,7 @@ def _draw(ctx: Context, evolution: Evolution, table: Table, words: dict[str, Any
         if isinstance(labels, Table) and labels.has(number):
             label = str(labels.get(number))
         style, marker = _style(table.get(number) if table.has(number) else "")
-        curves.append(Curve(*values, label, colour(each.colour), style, marker))
+        curves.append(Curve(*values, label, ink(each.colour), style, marker))
     if not curves:
         ctx.fail(21, "no curve to draw", at="e")
     first = evolution.curves[0]

@@ -27,7 +27,7 @@ from gibiane_ops.kernels.plot.skin import skin
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.kernels.topology import places_in, solids
-from gibiane_ops.output.targets import COLOURS
+from gibiane_ops.output.targets import COLOURS, ink
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.deformee import Shape, Vecteur
 from gibiane_ops.values.maillage import COLOURS as COLOUR_NAMES
@@ -183,9 +183,9 @@ def _thin(points: FloatArray, block: Block, dim: int, colour: str, label: str) -
         word = colour or COLOUR_NAMES[index]
         cells = block.cells[block.colours == index]
         if dim == 1:
-            layers.append(Lines(points, cells[:, :2], COLOURS.get(word) or "#20324a", 1.6, label=label))
+            layers.append(Lines(points, cells[:, :2], ink(word) or "#20324a", 1.6, label=label))
         else:
-            layers.append(Dots(points[cells[:, 0]], COLOURS.get(word) or "#b3261e", label=label))
+            layers.append(Dots(points[cells[:, 0]], ink(word) or "#b3261e", label=label))
         label = ""
     return layers
 
@@ -202,7 +202,7 @@ def outline_layers(points: FloatArray, mesh: Maillage, colour: str = "") -> list
     if blocks:
         seen = skin(points, blocks)
         edges = outline(points, seen.facets) if points.shape[1] == 3 else _rim(seen.facets)
-        layers.append(Lines(points, edges, COLOURS.get(colour) or "#5f6b7a", 1.0, "--"))
+        layers.append(Lines(points, edges, ink(colour) or "#5f6b7a", 1.0, "--"))
     return layers
 
 
@@ -232,7 +232,7 @@ def arrow_layers(points: FloatArray, vectors: Vecteur, size: float) -> list[Arro
         if arrow.factor is not None and arrow.factor < 0:
             start = start + arrow.factor * values[kept]
         label = " ".join(n for n in arrow.names if n in arrow.field.names)
-        layers.append(Arrows(start, values[kept], longest, COLOURS.get(arrow.colour) or "#111111", label))
+        layers.append(Arrows(start, values[kept], longest, ink(arrow.colour) or "#111111", label))
     return layers
 
 

@@ -37,6 +37,11 @@ def colour(word: str) -> str:
     return COLOURS.get(word[:4].upper(), "")
 
 
+def ink(word: str) -> str:
+    """Return the colour of lines, points and arrows: white ones would not be seen on paper and take the default."""
+    return "" if word[:4].upper() == "BLAN" else colour(word)
+
+
 def next_path(ctx: Context) -> Path:
     """Return the file of the next picture: name of OPTI 'FTRA' (or traces/trace), number from 001, extension."""
     wanted = ctx.session.options.get("FTRA")

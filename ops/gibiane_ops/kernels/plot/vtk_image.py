@@ -73,22 +73,7 @@ def quiet() -> Iterator[None]:
 def render(
     surfaces: Sequence[Surface], camera: Camera, frame: Frame, bands: Bands | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Draw surfaces.
-
-    Parameters
-    ----------
-    surfaces : sequence of Surface
-    camera : Camera
-    frame : Frame
-    bands : Bands or None
-        Colours of the values; needed when a surface has some.
-
-    Returns
-    -------
-    image : (height, width, 4) float64
-        Red, green, blue, opacity from 0 to 1; row 0 is the bottom one.
-    depth : (FINER height, FINER width) float64, length
-        Depth buffer of the opaque surfaces, minus infinity where there are none.
+    """Draw surfaces: arguments and results are those of `image.render`.
 
     Notes
     -----
