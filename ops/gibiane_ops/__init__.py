@@ -218,7 +218,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "PROI": ("gibiane_ops.fields.transfer",),
     # smoothing, error, sizes
     "LISSER": ("gibiane_ops.smoothing",),
-    "TAILLE": ("gibiane_ops.sizes", "gibiane_ops.adapting"),
+    "TAILLE": ("gibiane_ops.sizes", "gibiane_ops.adapting", "gibiane_ops.metrics"),
     # pictures and files
     "DEFORME": ("gibiane_ops.output.shapes",),
     "VECTEUR": ("gibiane_ops.output.shapes",),

@@ -38,7 +38,9 @@ TAIL = operator(
     "peaks, 'AJUS' to what the error around shows; the fewest elements are sought, with 'EGAL' (which implies 'SING') "
     "equal errors of all elements; 'MINI' and 'MAXI' bound the sizes, 'GRAD' their growth (1.5), 'NBMA' the number of "
     "elements; 'MINN' takes at a node the smallest size around it rather than their geometric mean. `CHD NB = TAILLE "
-    "...` also gives the number of elements that the sizes ask for. Nodes at one place in two solids (contact) get "
+    "...` also gives the number of elements that the sizes ask for. `CHM = TAILLE 'METRIQUE' U MODL 'NBMA' n`: the "
+    "metric (G11 G21 G22, in space G31 G32 G33) of n simplices on which the field U is interpolated best, long where "
+    "it varies little; 'ALLO' bounds how long. Nodes at one place in two solids (contact) get "
     "one size.",
     example="""
     OPTI DIME 3 ELEM CUB8 ;

@@ -64,6 +64,66 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
     return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
 
 
+METRIC = {2: ("G11", "G21", "G22")}
+"""Components of a metric by dimension: the rows of the lower triangle."""
+
+
+def metric_at(ctx: Context, size: Size, nodes: IntArray, dim: int) -> FloatArray | None:
+    """Return the metrics at nodes, (n, dim, dim), of a field that holds them (components G11 G21 G22 ...), else None.
+
+    Raises
+    ------
+    GibianeError
+        181 for a field without all the components, or that misses nodes; 41 for a metric that is not positive; 251 in
+        space, where the mesher of gmsh (MMG3D) did not come back within a minute for 800 tetrahedra.
+    """
+    if not isinstance(size, ChPoint) or not {"G11", "G22"} & set(size.names):
+        return None
+    if dim == 3:
+        ctx.fail(
+            251,
+            "in space a mesh cannot follow sizes that depend on the direction (components {names})",
+            at="size",
+            names=" ".join(size.names),
+            hint="G = det(M)**(1/3) asks for as many elements without direction",
+        )
+    wanted = METRIC[dim]
+    if not set(wanted) <= set(size.names):
+        ctx.fail(
+            181,
+            "a metric has the components {wanted}, not {names}",
+            at="size",
+            wanted=" ".join(wanted),
+            names=" ".join(size.names),
+            hint="TAILLE 'METRIQUE' makes such a field",
+        )
+    result = np.zeros((len(nodes), dim, dim))
+    for name in wanted:
+        missing = np.setdiff1d(nodes, size.parts[name][0])
+        if len(missing):
+            ctx.fail(
+                181,
+                "the field of sizes has no value at {count} of {total} nodes",
+                at="size",
+                count=len(missing),
+                total=len(nodes),
+                hint="it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field",
+            )
+        i, j = int(name[1]) - 1, int(name[2]) - 1
+        result[:, i, j] = result[:, j, i] = size.at(name, nodes)
+    finite = np.isfinite(result).all(axis=(1, 2), keepdims=True)
+    bad = np.linalg.eigvalsh(np.where(finite, result, 0.0))[:, 0] <= 0
+    if bad.any():
+        ctx.fail(
+            41,
+            "a metric has positive lengths in every direction: that of {count} nodes has not",
+            at="size",
+            count=int(bad.sum()),
+            hint="G11 G22 - G21**2 and G11 are above 0; a size h in every direction is G11 = G22 = 1/h**2",
+        )
+    return result
+
+
 def numbered(ctx: Context, cells: list[IntArray]) -> tuple[IntArray, list[IntArray]]:
     """Return the nodes of elements, sorted, and the elements by ranks in that list."""
     nodes = np.unique(np.concatenate([each.ravel() for each in cells]))

@@ -14,7 +14,7 @@ from gibiane_ops.kernels.errors import MeshingFailed
 from gibiane_ops.kernels.mesh import unions
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
-from gibiane_ops.mesh.filling import fill_contour, fill_envelope, sizes_at
+from gibiane_ops.mesh.filling import fill_contour, fill_envelope, metric_at, sizes_at
 from gibiane_ops.mesh.groups import Groups
 from gibiane_ops.mesh.local import divide, move_nodes
 from gibiane_ops.values.champs import ChPoint, MChaml
@@ -28,7 +28,9 @@ REMA = operator(
     topic="mesh",
     summary="new mesh of the same domain with other sizes",
     notice="`M2 = REMAILLER M1 size` meshes the domain of M1 (TET4 in space, TRI3 in the plane) again; size is a "
-    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse). Corners, plane faces and "
+    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse), or in a plane a metric "
+    "G11 G21 G22 of TAILLE 'METRIQUE': elements are then long where it says so "
+    "(such a mesh is not quite the same twice). Corners, plane faces and "
     "straight edges are kept exactly, curved faces follow the old facets. `M2 T2 = REMAILLER M1 size 'GROU' T1`: the "
     "MAILLAGE in the table T1 (parts of M1, of its boundary, of edges, points) are found again on M2 under the same "
     "indices. Index PAIRES of T1, a table of tables (1: face of the second body, 2: face of the first), names contact "
@@ -72,7 +74,8 @@ def _remesh(
         )
     store = nodes_of(ctx)
     nodes = g.nodes
-    sizes = sizes_at(ctx, size, nodes)
+    metric = metric_at(ctx, size, nodes, dim)
+    sizes = sizes_at(ctx, size, nodes) if metric is None else metric
     groups = Groups(ctx, grou if grou is not None else Table(), nodes)
     with explained(ctx, "g"):
         try:

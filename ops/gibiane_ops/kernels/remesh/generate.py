@@ -9,7 +9,14 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import MeshingFailed
-from gibiane_ops.kernels.remesh.session import ELEMENT_TYPES, gmsh_model, read_nodes, read_simplices, set_size_field
+from gibiane_ops.kernels.remesh.session import (
+    ELEMENT_TYPES,
+    gmsh_model,
+    read_nodes,
+    read_simplices,
+    set_metric_field,
+    set_size_field,
+)
 from gibiane_ops.kernels.remesh.skeleton import Skeleton
 
 
@@ -51,7 +58,8 @@ def generate(skeleton: Skeleton, cells: IntArray, sizes: FloatArray) -> RawMesh:
     skeleton : Skeleton
     cells : (m, dim + 1) int64
         Old cells, which carry the sizes.
-    sizes : (n_points,) float64, length
+    sizes : (n_points,) float64, length, or in a plane (n_points, 2, 2) float64, length^-2
+        Edges wanted, or metrics.
 
     Returns
     -------
@@ -68,7 +76,10 @@ def generate(skeleton: Skeleton, cells: IntArray, sizes: FloatArray) -> RawMesh:
             _discrete_entities(gmsh, skeleton)
         if skeleton.dim == 3:
             _volumes(gmsh, skeleton)
-        set_size_field(gmsh, skeleton.points, cells, sizes)
+        if sizes.ndim == 3:
+            set_metric_field(gmsh, skeleton.points, cells, sizes)
+        else:
+            set_size_field(gmsh, skeleton.points, cells, sizes)
         gmsh.model.mesh.generate(skeleton.dim)
         return _read(gmsh, skeleton)
 

@@ -71,8 +71,9 @@ def remesh(
     points : (n_points, dim) float64, length
     cells : (m, dim + 1) int64
         TRI3 in a plane or TET4 in space; all the solids together.
-    sizes : float or (n_points,) float64, length
-        Edge of the regular simplex wanted, one value or one per node of the old mesh.
+    sizes : float or (n_points,) float64, length, or in a plane (n_points, 2, 2) float64, length^-2
+        Edge of the regular simplex wanted, one value or one per node of the old mesh; or the metric in which the edges
+        are 1 long.
     groups : dict of str to (k, c) int64, optional
         Named parts of the mesh; c tells what they hold: dim + 1 cells, dim facets, 2 edges, 1 nodes.
     pairs : list of (str, str)
@@ -114,8 +115,9 @@ def remesh(
     dim = points.shape[1]
     space = np.pad(points, ((0, 0), (0, 3 - dim)))
     named = {name: np.asarray(group, np.int64) for name, group in (groups or {}).items()}
-    nodal = np.broadcast_to(np.asarray(sizes, np.float64), len(points))
+    given = np.asarray(sizes, np.float64)
     used = np.unique(cells)
+    nodal = _equal_sizes(given) if given.ndim == 3 else np.broadcast_to(given, len(points))
     if not (np.isfinite(nodal[used]).all() and (nodal[used] > 0).all()):
         raise BadValue("size", float(nodal[used].min()), "finite and positive")
 
@@ -141,13 +143,30 @@ def remesh(
         wanted = predicted_count(points, [(CELL[dim], new_cells)], common)
     elif count != "free":
         wanted = float(count)
-    raw, counts = _mesh_to_count(skeleton, new_cells, common, wanted)
+    field = common
+    if given.ndim == 3:
+        flat = given.reshape(len(points), -1)
+        mean = np.stack([_group_mean(flat[:, k], merged, used) for k in range(dim * dim)], axis=1)
+        field = mean.reshape(given.shape)
+    raw, counts = _mesh_to_count(skeleton, new_cells, field, wanted)
     volumes = geometry.measures(shape(CELL[dim]), raw.points[raw.cells][:, :, :dim])
     _check_measures(skeleton, np.abs(geometry.measures(shape(CELL[dim]), points[cells])), np.abs(volumes))
     turned = np.where((volumes < 0)[:, None], raw.cells[:, [1, 0, *range(2, dim + 1)]], raw.cells)
     old = OldMesh(cells, region, solid, merged, named, contacts)
     new = carry(old, skeleton, replace(raw, cells=turned))
     return Remeshed(raw.points[new.source][:, :dim], new.cells, new.groups, new.pairs, wanted, counts)
+
+
+def _equal_sizes(metric: FloatArray) -> FloatArray:
+    """Return the size of the regular simplex of the same measure as one of a metric; nan where it is none."""
+    values = np.linalg.eigvalsh(np.where(np.isfinite(metric), metric, -1.0))
+    proper = (values > 0).all(axis=1) & np.isfinite(metric).all(axis=(1, 2))
+    return np.where(proper, np.where(values > 0, values, 1.0).prod(axis=1) ** (-0.5 / metric.shape[1]), np.nan)
+
+
+def _scaled(sizes: FloatArray, factor: float) -> FloatArray:
+    """Multiply sizes, or those of metrics."""
+    return sizes / factor**2 if sizes.ndim == 3 else factor * sizes
 
 
 def _group_mean(values: FloatArray, group: IntArray, members: IntArray) -> FloatArray:
@@ -165,7 +184,7 @@ def _mesh_to_count(skeleton: Skeleton, cells: IntArray, sizes: FloatArray, wante
     factors, counts = [FIRST_GUESS], [0]
     best: RawMesh | None = None
     for trial in range(TRIALS):
-        raw = generate(skeleton, cells, factors[-1] * sizes)
+        raw = generate(skeleton, cells, _scaled(sizes, factors[-1]))
         counts[-1] = len(raw.cells)
         if best is None or _rank(counts[-1], wanted) < _rank(len(best.cells), wanted):
             best = raw

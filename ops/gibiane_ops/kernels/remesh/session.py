@@ -43,6 +43,9 @@ OPTIONS: dict[str, float] = {
 }
 """One thread and fixed seeds: the same input gives the same mesh, bit for bit."""
 
+BAMG = 7
+"""Code of gmsh for the plane mesher that follows a metric."""
+
 ELEMENT_TYPES = {0: 15, 1: 1, 2: 2, 3: 4}
 """gmsh element code of the simplex of each dimension."""
 
@@ -144,6 +147,42 @@ def set_size_field(gmsh: Any, points: FloatArray, cells: IntArray, sizes: FloatA
     view = gmsh.view.add("size")
     data = np.hstack([points[cells].transpose(0, 2, 1).reshape(m, 3 * n), sizes[cells]])
     gmsh.view.addListData(view, {3: "ST", 4: "SS"}[n], m, data.ravel())
+    field = gmsh.model.mesh.field.add("PostView")
+    gmsh.model.mesh.field.setNumber(field, "ViewTag", view)
+    gmsh.model.mesh.field.setNumber(field, "UseClosest", 1)
+    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+
+
+def set_metric_field(gmsh: Any, points: FloatArray, cells: IntArray, metric: FloatArray) -> None:
+    """Make the sizes of the next plane mesh those of a field of metrics, and choose the mesher that follows it.
+
+    Parameters
+    ----------
+    gmsh : module
+    points : (n_points, 3) float64, length
+    cells : (m, 3) int64
+    metric : (n_points, 2, 2) float64, length^-2
+        Interpolated; a point outside takes the value of the nearest node.
+
+    Raises
+    ------
+    MeshingFailed
+        When gmsh has been built without BAMG.
+
+    Notes
+    -----
+    BAMG does not give the same mesh twice, whatever the seed and the number of threads.
+    """
+    m = len(cells)
+    if "Bamg" not in gmsh.option.getString("General.BuildOptions").split():
+        raise MeshingFailed("this gmsh has no BAMG, which meshes to sizes that depend on the direction")
+    gmsh.option.setNumber("Mesh.Algorithm", BAMG)
+    full = np.zeros((len(metric), 3, 3))
+    full[:, :2, :2] = metric
+    full[:, 2, 2] = np.sqrt(np.linalg.det(metric))
+    view = gmsh.view.add("metric")
+    data = np.hstack([points[cells].transpose(0, 2, 1).reshape(m, 9), full[cells].reshape(m, 27)])
+    gmsh.view.addListData(view, "TT", m, data.ravel())
     field = gmsh.model.mesh.field.add("PostView")
     gmsh.model.mesh.field.setNumber(field, "ViewTag", view)
     gmsh.model.mesh.field.setNumber(field, "UseClosest", 1)
