@@ -34,6 +34,8 @@ SOLUTIONS: dict[str, str] = {
     # studies
     "no TABLE of subtype ESCLAVE among its operands": "pas de TABLE de sous-type ESCLAVE parmi ses opérandes",
     "T = TABL ESCLAVE ; T.1 = ... ; gives each case its value": "T = TABL ESCLAVE ; T.1 = ... ; donne à chaque cas sa valeur",
+    "'DURE' gives {n} lengths of time for {cases} cases": "'DURE' donne {n} durées pour {cases} cas",
+    "the lengths of time of 'DURE' must be positive, not {least}": "les durées de 'DURE' doivent être positives, pas {least}",
     "table {n} of subtype ESCLAVE has other indices than the first": "la table {n} de sous-type ESCLAVE a d'autres indices que la première",
     "some cases give {low} results, others {high}": "des cas donnent {low} résultats, d'autres {high}",
     "a {type} cannot go to a worker": "un {type} ne peut aller chez un assistant",

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,9 +10,11 @@ from typing import Any
 from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
-from gibiane.values import ENTIER, MOT, TABLE, Table
+from gibiane.values import ENTIER, LISTREEL, MOT, TABLE, Table
 from gibiane_ops.assistants import study as studies
 from gibiane_ops.assistants import workers
+from gibiane_ops.assistants.needs import called
+from gibiane_ops.assistants.progress import Progress
 from gibiane_ops.assistants.study import Answer, Case
 from gibiane_ops.values.archive import BadArchive, NotSaveable
 
@@ -35,7 +35,10 @@ ASSI = operator(
     "outside.\n"
     "'REPR' folder keeps each finished case there: a study that was interrupted, run again, only does what is missing. "
     "A case is done again when its operands, the procedures of the script or the objects that they name have changed; "
-    "remove the folder to begin anew. Progress is shown on a terminal, or with ECHO >= 1.\n"
+    "remove the folder to begin anew.\n"
+    "Progress is shown on a terminal, or with ECHO >= 1. 'DURE' gives the seconds that each case is expected to take: "
+    "the time ahead is said before the first case and corrected by what cases took, the longest cases begin, and "
+    "progress is shown in a file too, every half minute.\n"
     "ASSI n does the instruction now, here: only 'TOUS' spreads work.",
     example="DEBP CARRE X*FLOTTANT ;\nY = X ** 2 ;\nFINP Y ;\nT = TABL ESCLAVE ;\n"
     "REPE B 3 ; T. &B = FLOT &B ; FIN B ;\nT2 = ASSI 'TOUS' CARRE T ;\nMESS (T2.1) (T2.2) (T2.3) ;",
@@ -47,8 +50,10 @@ ASSI = operator(
     Arg("n", ENTIER, "number of the assistant", optional=True),
     Key("TOUS", "every case of the tables ESCLAVE"),
     Key("REPR", "keep finished cases in a folder", Arg("folder", MOT)),
+    Key("DURE", "expected seconds of each case", Arg("seconds", LISTREEL)),
     Arg("t", TABLE, "of subtype ESCLAVE", many=True, optional=True),
-    syntax="n:ENTIER instruction... | 'TOUS' ('REPR' folder:MOT) instruction with t:TABLE ESCLAVE...",
+    syntax="n:ENTIER instruction... | 'TOUS' ('REPR' folder:MOT) ('DURE' seconds:LISTREEL) "
+    "instruction with t:TABLE ESCLAVE...",
 )
 def _assi(ctx: Context, q: Operands) -> None:
     if q.read_keyword(["TOUS"]) is None:
@@ -56,16 +61,25 @@ def _assi(ctx: Context, q: Operands) -> None:
             raise q.missing("ENTIER or 'TOUS'", "the number of an assistant")
         ctx.session.evaluator.evaluate(q, 1)
         return
-    folder = Path(str(q.need(MOT, "a folder"))) if q.read_keyword(["REPR"]) else None
+    folder, expected = None, None
+    while (word := q.read_keyword(["REPR", "DURE"])) is not None:
+        if word == "REPR":
+            folder = Path(str(q.need(MOT, "a folder")))
+        else:
+            expected = q.need(LISTREEL, "expected seconds").values.tolist()
     cases = _cases(ctx, q)
+    if expected is not None and len(expected) != len(cases):
+        ctx.fail(26, "'DURE' gives {n} lengths of time for {cases} cases", n=len(expected), cases=len(cases))
+    if expected is not None and min(expected) <= 0.0:
+        ctx.fail(26, "the lengths of time of 'DURE' must be positive, not {least}", least=min(expected))
     results = _Results(ctx, cases)
-    if folder is None and not ctx.session.options.get("DASK") and _workers(ctx) < 1:
+    if folder is None and expected is None and not ctx.session.options.get("DASK") and _workers(ctx) < 1:
         for number, case in enumerate(cases):
             inner = Operands(ctx.session, q.source, list(case.values), list(q.nodes))
             ctx.session.evaluator.evaluate(inner, 1)
             results.set(number, inner.values)
     else:
-        _spread(ctx, cases, folder, results)
+        _spread(ctx, cases, folder, expected, results)
     node = q.nodes[0] if q.nodes else ctx.node
     q.values.clear()
     q.nodes.clear()
@@ -122,15 +136,17 @@ class _Results:
         return made
 
 
-def _spread(ctx: Context, cases: list[Case], folder: Path | None, results: _Results) -> None:
+def _spread(
+    ctx: Context, cases: list[Case], folder: Path | None, expected: list[float] | None, results: _Results
+) -> None:
     """Run the cases that no file of `folder` holds, on whoever is there; set the results of all."""
     session = ctx.session
-    found = studies.called(session, cases)
+    found = called(session, [value for case in cases for value in case.values])
     try:
         package = studies.pack(session, cases, found)
     except NotSaveable as failure:
         ctx.fail(39, "a {type} cannot go to a worker", type=failure.type_name)
-    progress = _Progress(ctx, len(cases))
+    progress = Progress(ctx, len(cases), expected, _workers(ctx))
     kept = (
         {n: folder / f"case_{studies.fingerprint(session, c, found)}.zip" for n, c in enumerate(cases)}
         if folder
@@ -143,10 +159,12 @@ def _spread(ctx: Context, cases: list[Case], folder: Path | None, results: _Resu
             missing.append(number)
         else:
             results.set(number, values)
-    progress.found(len(results.found))
+    progress.begin(missing)
+    if expected is not None:
+        missing.sort(key=lambda number: -expected[number])
     failed: list[tuple[int, Answer]] = []
     texts: dict[int, str] = {}
-    following = iter(missing)
+    following = iter(sorted(missing))
     awaited = next(following, None)
     for number, answer in _answers(ctx, package, missing):
         texts[number] = answer.text
@@ -159,7 +177,7 @@ def _spread(ctx: Context, cases: list[Case], folder: Path | None, results: _Resu
         while awaited in texts:  # what cases print stands in their order, whoever was first
             _print(ctx, texts[awaited])
             awaited = next(following, None)
-        progress.done()
+        progress.done(number, answer.seconds)
     if failed:
         failed.sort()
         number, answer = failed[0]
@@ -221,34 +239,3 @@ def _keep(path: Path, results: bytes) -> None:
 def _print(ctx: Context, text: str) -> None:
     for line in text.splitlines():
         ctx.write(line)
-
-
-class _Progress:
-    """How far a study is: on a terminal, or in the listing with ECHO >= 1."""
-
-    def __init__(self, ctx: Context, total: int) -> None:
-        self.ctx = ctx
-        self.total = total
-        self.count = self.old = 0
-        self.start = time.perf_counter()
-        self.shown = sys.stderr.isatty() and ctx.session.err is sys.stderr
-        self.listed = int(ctx.option("ECHO")) >= 1
-
-    def found(self, count: int) -> None:
-        self.count = self.old = count
-        if count and (self.shown or self.listed):
-            self._tell(f" ASSI : {count} of {self.total} cases were done before")
-
-    def done(self) -> None:
-        self.count += 1
-        elapsed = time.perf_counter() - self.start
-        left = elapsed / (self.count - self.old) * (self.total - self.count)
-        if self.shown or self.listed:
-            self._tell(f" ASSI : {self.count} of {self.total} cases, {elapsed:.0f} s, about {left:.0f} s left")
-
-    def _tell(self, line: str) -> None:
-        if self.listed:
-            self.ctx.write(line)
-        else:
-            self.ctx.session.err.write(line.ljust(70) + ("\n" if self.count == self.total else "\r"))
-            self.ctx.session.err.flush()

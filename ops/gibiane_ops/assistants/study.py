@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import io
-import re
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from gibiane import __version__
@@ -17,14 +17,14 @@ from gibiane.binding import Operands
 from gibiane.diagnostics import Diagnostic, GibianeError
 from gibiane.nodes import Literal, Name, Node
 from gibiane.source import SourceText
-from gibiane.values import Procedure, Table, Texte, Value, type_of
+from gibiane.values import Procedure, Value, type_of
+from gibiane_ops.assistants.needs import words
 from gibiane_ops.values.archive import Archive, NotSaveable, write_archive
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.texts import rebuilt
 
 # What a case does not take from the session that asks: how that one talks, and that it has workers.
 OWN_OPTIONS = frozenset({"ASSI", "DASK", "ECHO", "WARN", "DONN"})
-WORD = re.compile(r"[A-Za-z_@!][A-Za-z0-9_@]*")
 
 
 class Case(NamedTuple):
@@ -49,6 +49,8 @@ class Answer(NamedTuple):
     code : int or str
     sentence : str
         Of the failure, empty when there is none.
+    seconds : float
+        On the clock of who ran it.
     """
 
     results: bytes | None
@@ -56,6 +58,7 @@ class Answer(NamedTuple):
     level: int
     code: int | str
     sentence: str
+    seconds: float
 
 
 def case_of(q: Operands, index: Any, values: list[Any]) -> Case:
@@ -68,38 +71,6 @@ def case_of(q: Operands, index: Any, values: list[Any]) -> Case:
             shown = str(value) if isinstance(value, bool | int | float) else type_of(value)
         words.append((shown, quoted))
     return Case(index, values, words)
-
-
-def called(session: Any, cases: Iterable[Case]) -> dict[str, Any]:
-    """Return the objects of the session that the cases may name: procedures, and what those name in turn."""
-    visible = session.names()
-    found: dict[str, Any] = {}
-    waiting = [text for case in cases for value in case.values for text in _texts(value)]
-    seen: set[str] = set()
-    while waiting:
-        for match in WORD.findall(waiting.pop()):
-            word = match.upper()[:24]
-            if word in seen:
-                continue
-            seen.add(word)
-            if word in visible and session.operator(word) is None:
-                found[word] = visible[word]
-                waiting.extend(_texts(visible[word]))
-    return found
-
-
-def _texts(value: Any, depth: int = 0) -> list[str]:
-    """Return the texts of a value in which names may stand."""
-    if isinstance(value, str):
-        return [value]
-    if isinstance(value, Procedure):
-        first, last = value.program[value.start - 1], value.program[value.end]
-        return [first.source.text[first.start : last.end]]
-    if isinstance(value, Texte):
-        return [value.text]
-    if isinstance(value, Table) and depth < 8:
-        return [text for _, item in value.entries.values() for text in _texts(item, depth + 1)]
-    return []
 
 
 def pack(session: Any, cases: list[Case], found: dict[str, Any]) -> bytes:
@@ -128,7 +99,7 @@ def fingerprint(session: Any, case: Case, found: dict[str, Any]) -> str:
     """Return a text that changes when the case, its procedures (shipped ones by version) or its objects change."""
     digest = hashlib.sha256(__version__.encode())
     digest.update(_content(session, {"case": [case.values, [list(word) for word in case.words]], **found}))
-    for name in sorted({match.upper() for value in case.values for t in _texts(value) for match in WORD.findall(t)}):
+    for name in sorted({word for word, _ in words(case.values)}):
         source = session.library.find(name) if session.operator(name) is None and name not in found else None
         if source is not None:
             digest.update(source.text.encode())
@@ -156,6 +127,7 @@ def run_case(study: bytes, number: int, make_session: Callable[..., Any]) -> Ans
     make_session : callable
         The class of sessions: it is named by who asks, since operators do not know it.
     """
+    start = time.perf_counter()
     out = io.StringIO()
     session = make_session(out=out, err=out)
     archive = Archive(io.BytesIO(study))
@@ -174,10 +146,11 @@ def run_case(study: bytes, number: int, make_session: Callable[..., Any]) -> Ans
     except GibianeError as failure:
         diagnostic: Diagnostic = failure.diagnostic
         session.emit(diagnostic)
-        return Answer(None, out.getvalue(), session.worst, diagnostic.code, str(failure))
+        return Answer(None, out.getvalue(), session.worst, diagnostic.code, str(failure), time.perf_counter() - start)
     except NotSaveable as failure:
-        return Answer(None, out.getvalue(), 2, 39, f"a {failure.type_name} cannot come back from a worker")
-    return Answer(results.getvalue(), out.getvalue(), session.worst, 0, "")
+        sentence = f"a {failure.type_name} cannot come back from a worker"
+        return Answer(None, out.getvalue(), 2, 39, sentence, time.perf_counter() - start)
+    return Answer(results.getvalue(), out.getvalue(), session.worst, 0, "", time.perf_counter() - start)
 
 
 def results_of(session: Any, answer: bytes) -> list[Value | int | float | str | bool]:

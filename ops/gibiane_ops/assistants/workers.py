@@ -75,13 +75,28 @@ def _pool(workers: int) -> Any:
     before = {name: os.environ.get(name) for name in THREADS}
     os.environ.update({name: share for name in THREADS if before[name] is None})
     try:
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
         pool.submit(int).result()  # the processes exist now, with this environment
     finally:
         for name, value in before.items():
             if value is None:
                 os.environ.pop(name, None)
     return pool
+
+
+def _end_with_parent() -> None:
+    """End this worker when the process that asks is killed: nobody is left to take what it computes."""
+    from multiprocessing import parent_process
+    from threading import Thread
+
+    parent = parent_process()
+
+    def watch() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=watch, daemon=True).start()
 
 
 def _end(pool: Any) -> None:

@@ -1,0 +1,90 @@
+"""How far a study is, and how long it will take: told while it runs."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+
+from gibiane.registry import Context
+
+EVERY = 30.0  # seconds between two lines of a listing that is no terminal
+
+
+class Progress:
+    """The cases done and left of a study.
+
+    Parameters
+    ----------
+    ctx : Context
+    total : int
+        Number of cases.
+    expected : sequence of float or None
+        Seconds that each case is expected to take, on one worker.
+    workers : int
+        Processes that share them, 0 for this one.
+    """
+
+    def __init__(self, ctx: Context, total: int, expected: Sequence[float] | None, workers: int) -> None:
+        self.ctx = ctx
+        self.total = total
+        self.expected = expected
+        self.workers = max(1, workers)
+        self.missing: set[int] = set()
+        self.count = self.old = 0
+        self.work = self.done_work = self.done_seconds = 0.0
+        self.start = self.last = time.perf_counter()
+        self.terminal = sys.stderr.isatty() and ctx.session.err is sys.stderr
+        self.listed = int(ctx.option("ECHO")) >= 1
+        self.slow = expected is not None and not self.terminal and not self.listed and ctx.session.err is sys.stderr
+
+    def begin(self, missing: Sequence[int]) -> None:
+        """Note which cases are to be done, and say how long they will take."""
+        self.missing = set(missing)
+        self.count = self.old = self.total - len(missing)
+        if self.old:
+            self._tell(f" ASSI : {self.old} of {self.total} cases were done before")
+        if self.expected is not None and missing:
+            self.work = sum(self.expected[number] for number in missing)
+            self._tell(f" ASSI : {len(missing)} cases to do, about {span(self.left())} on {self.workers} process(es)")
+
+    def left(self) -> float:
+        """Return the seconds ahead: what was expected, corrected by what the finished cases took."""
+        elapsed = time.perf_counter() - self.start
+        if self.expected is None:
+            return elapsed / max(1, self.count - self.old) * (self.total - self.count)
+        ratio = self.done_seconds / self.done_work if self.done_work else 1.0
+        workers = min(self.workers, max(1, len(self.missing)))
+        return max(0.0, ratio * self.work / workers - elapsed) if self.count < self.total else 0.0
+
+    def done(self, number: int, seconds: float) -> None:
+        """Note that a case is finished."""
+        self.count += 1
+        if self.expected is not None:
+            self.done_work += self.expected[number]
+            self.done_seconds += seconds
+        now = time.perf_counter()
+        if self.slow and now - self.last < EVERY and self.count < self.total:
+            return
+        self.last = now
+        elapsed, left = span(now - self.start), span(self.left())
+        self._tell(f" ASSI : {self.count} of {self.total} cases, {elapsed}, about {left} left")
+
+    def _tell(self, line: str) -> None:
+        if self.listed:
+            self.ctx.write(line)
+        elif self.terminal:
+            self.ctx.session.err.write(line.ljust(70) + ("\n" if self.count == self.total else "\r"))
+        elif self.slow:
+            self.ctx.session.err.write(line + "\n")
+        self.ctx.session.err.flush()
+
+
+def span(seconds: float) -> str:
+    """Write a length of time: 45 s, 3 min 20 s, 2 h 05 min."""
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole // 60 % 60:02d} min"
