@@ -33,7 +33,7 @@ def test_the_short_report_of_the_thesis(tmp_path: Path) -> None:
     try:
         browser.open(file, "location.pathname.endsWith('rapport.html') && gibiane.data !== null")
         pages = browser.value("gibiane.data.pages.length")
-        assert pages == 15
+        assert pages == 18
         for page in range(pages):
             browser.value(f"gibiane.open({page})")
         browser.wait("Object.keys(gibiane.views).length >= 6")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
 from gibiane.forms import Arg
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, FLOTTANT, MOT
@@ -11,8 +14,8 @@ EXTE = operator(
     topic="language",
     summary="run a command of the system",
     notice="The words and numbers are joined by blanks and given to the system's shell; what the command "
-    "writes is shown. Refused unless the program was started with --allow-exec: a script from "
-    "elsewhere could do anything.",
+    "writes is shown; `python` is the one that runs Gibiane. Refused unless the program was started "
+    "with --allow-exec: a script from elsewhere could do anything.",
     example="OPTI ERRE IGNO ; EXTE 'date' ;",
     see=["OPTION"],
 )
@@ -32,7 +35,11 @@ def _run(ctx: Context, command: list[str | int | float]) -> None:
             hint="start with gibiane --allow-exec if you trust the script",
         )
     ctx.session.out.flush()
-    done = subprocess.run(text, shell=True, capture_output=True, text=True, errors="replace", check=False)
+    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", os.defpath)])
+    environment = os.environ | {"PATH": path}
+    done = subprocess.run(
+        text, shell=True, capture_output=True, text=True, errors="replace", check=False, env=environment
+    )
     for line in (done.stdout + done.stderr).splitlines():
         ctx.write(line)
     if done.returncode:

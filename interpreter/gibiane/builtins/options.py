@@ -249,7 +249,7 @@ VALE = operator(
     notice="Reads an option: what OPTI set, else what holds without it (an error when nothing does: DIME comes before "
     "MODE). MODE is one word, PLANCONT or TRID; `VALE 'MODE' 'FOUR'` the harmonic. PREC, PETI and GRAN are the "
     "precision, the smallest and the largest FLOTTANT. 'SOUC' is the number of the last warning, 'ERMA' the highest "
-    "error level so far. What VALE gives, OPTI takes back.",
+    "error level so far, 'EXEC' says whether commands of the system are allowed. What VALE gives, OPTI takes back.",
     example="OPTI DIME 2 ; MESS (VALE DIME) ;",
     see=["OPTION"],
 )
@@ -281,14 +281,17 @@ UNSET: dict[str, Any] = {
     *(Key(word, DOCS.get(word, NO_EFFECT)) for word in OPTIONS),
     Key("SOUC", "number of the last warning, 0 when there is none"),
     Key("ERMA", "highest error level so far"),
+    Key("EXEC", "commands of the system are allowed (EXTE)"),
     syntax="option:MOT",
 )
 def _vale(ctx: Context, q: Operands) -> Any:
-    word = q.need_keyword([*OPTIONS, "SOUC", "ERMA"])
+    word = q.need_keyword([*OPTIONS, "SOUC", "ERMA", "EXEC"])
     if word == "ERMA":
         return ctx.session.worst
     if word == "SOUC":
         return ctx.session.concern
+    if word == "EXEC":
+        return bool(ctx.option("EXEC"))
     value = ctx.session.options.get(word)
     if word == "MODE":
         mode = str(value or {2: "PLAN DEFO", 3: "TRID"}.get(ctx.session.options["DIME"], ""))

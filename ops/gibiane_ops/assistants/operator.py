@@ -148,7 +148,10 @@ def _spread(
         ctx.fail(39, "a {type} cannot go to a worker", type=failure.type_name)
     progress = Progress(ctx, len(cases), expected, _workers(ctx))
     kept = (
-        {n: folder / f"case_{studies.fingerprint(session, c, found)}.zip" for n, c in enumerate(cases)}
+        {
+            n: folder / f"case_{studies.fingerprint(session, c, called(session, c.values))}.zip"
+            for n, c in enumerate(cases)
+        }
         if folder
         else {}
     )

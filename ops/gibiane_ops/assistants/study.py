@@ -6,6 +6,7 @@ in a session of its own, which begins with the options of the session that asks.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import io
 import time
@@ -128,6 +129,7 @@ def run_case(study: bytes, number: int, make_session: Callable[..., Any]) -> Ans
         The class of sessions: it is named by who asks, since operators do not know it.
     """
     start = time.perf_counter()
+    gc.collect()  # a session holds itself in circles, and with it the factors of an earlier case: gigabytes
     out = io.StringIO()
     session = make_session(out=out, err=out)
     archive = Archive(io.BytesIO(study))

@@ -43,10 +43,11 @@ def local(study: bytes, numbers: Sequence[int], workers: int, make_session: Call
     waiting = list(numbers)
     deaths = 0
     while waiting:
-        pool = _pool(min(workers, len(waiting)))
-        futures = {pool.submit(run_case, study, number, make_session): number for number in waiting}
+        pool = None
         finished = False
         try:
+            pool = _pool(min(workers, len(waiting)))  # a worker can die while it starts, too
+            futures = {pool.submit(run_case, study, number, make_session): number for number in waiting}
             while futures:
                 done, _ = wait(futures, return_when=FIRST_COMPLETED)
                 for future in done:
@@ -61,9 +62,10 @@ def local(study: bytes, numbers: Sequence[int], workers: int, make_session: Call
             if deaths >= DEATHS:
                 raise WorkersLost(waiting, str(failure)) from failure
         finally:
-            if not finished:
-                _end(pool)
-            pool.shutdown(wait=finished, cancel_futures=True)
+            if pool is not None:
+                if not finished:
+                    _end(pool)
+                pool.shutdown(wait=finished, cancel_futures=True)
 
 
 def _pool(workers: int) -> Any:

@@ -1,11 +1,14 @@
 """CalculiX: writes the deck of a two-block test, runs ccx, parses results.
 usage: ccx_contact.py OUTDIR CASE MU TYPE [ELEM] [KN] [KT] [SINF]
 TYPE: N2S (node to surface), S2S (surface to surface), MORTAR, LINMORTAR, BONDED
-ELEM: C3D8 (default), C3D8I, C3D8R; KN normal stiffness [N/mm3], KT stick slope [N/mm3], SINF tension at infinity."""
+ELEM: C3D8 (default), C3D8I, C3D8R; KN normal stiffness [N/mm3], KT stick slope [N/mm3], SINF tension at infinity.
+--nodes=FILE keeps the displacements of all nodes (npz: points, upper, u)."""
 import sys, os, re, json, time, subprocess, resource
 import numpy as np
 from blocks import case, joined, named, E, NU, P
 
+nodes_file = next((a[8:] for a in sys.argv if a.startswith("--nodes=")), None)
+sys.argv = [a for a in sys.argv if not a.startswith("--nodes=")]
 out, name, mu, typ = sys.argv[1], sys.argv[2], float(sys.argv[3]), sys.argv[4]
 elem = sys.argv[5] if len(sys.argv) > 5 else "C3D8"
 kn = float(sys.argv[6]) if len(sys.argv) > 6 else 1e9
@@ -65,6 +68,8 @@ with open(os.path.join(out, job + ".inp"), "w") as f:
     w("*STEP%s\n*STATIC%s\n1., 1.\n" % ("" if bonded else ", INC=200", "" if bonded else ", DIRECT"))
     w("*BOUNDARY\nBASE, 1, 3\n*DLOAD\n" + "".join(f"{e}, P2, {P}\n" for e in zt))
     w("*NODE PRINT, NSET=OBS, FREQUENCY=1\nU\n*NODE PRINT, NSET=CUP\nU\n*NODE PRINT, NSET=CLO\nU\n*NODE PRINT, NSET=BASE, TOTALS=ONLY\nRF\n")
+    if nodes_file:
+        w("*NODE PRINT, NSET=NALL\nU\n")
     w("*END STEP\n")
 t = time.perf_counter()
 p = subprocess.run(["ccx", "-i", job], cwd=out, capture_output=True, text=True, timeout=1800)
@@ -92,6 +97,10 @@ try:
         wt = np.linalg.norm(w_[:, :2], axis=1)
         o.update(max_slip=wt.max(), n_slip=int((wt > 1e-6).sum()), max_gap=w_[:, 2].max(), min_gap=w_[:, 2].min(),
                  slip_corner=wt[np.argmax(xyz[pairs[:, 0]][:, :2].sum(1))])
+    if nodes_file:
+        all_u = data[("U", "NALL")]
+        u_ = np.zeros_like(xyz); u_[all_u[:, 0].astype(int) - 1] = all_u[:, 1:4]
+        np.savez(nodes_file, points=xyz, upper=np.arange(len(xyz)) >= len(xyz) - len(np.unique(cu)), u=u_)
     o["sum_Rz_base"] = data[("RF", "BASE")].ravel()[-1]
 except Exception as ex:
     o["parse"] = repr(ex)
