@@ -55,9 +55,10 @@ bench: venv
 	$(BIN)/python -m pytest -m bench -s
 
 report: venv
-	cd examples/these && $(abspath $(BIN))/gibiane rapport.dgibi
+	cd examples/these && $(abspath $(BIN))/gibiane --allow-exec rapport.dgibi
 
-# RAPIDE=FAUX, by hand, is the long one: gibiane rapport.dgibi RAPIDE=FAUX --workers 2
+# --allow-exec: other codes, where they are installed, are run on the same scene. The long one, by hand:
+# gibiane --allow-exec rapport.dgibi RAPIDE=FAUX --workers 2
 
 fuzz: venv
 	GIBIANE_FUZZ=20000 $(BIN)/python -m pytest tests/properties/test_fuzz.py
