@@ -11,7 +11,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, MMODEL, POINT
 from gibiane_ops.kernels import assembly, topology
-from gibiane_ops.kernels.contact.pairs import facets_of_body
+from gibiane_ops.kernels.contact.outward import facets_of_body
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
 from gibiane_ops.kernels.supports import moved

@@ -18,7 +18,7 @@ from gibiane_ops.kernels.assembly import (
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.newton import solve_coulomb
-from gibiane_ops.kernels.contact.pairs import node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.combine import combine, facets_to_cells
 from gibiane_ops.kernels.estimate.contact import contact_error

@@ -10,7 +10,8 @@ from two_blocks import Blocks, blocks, brick, fixing, load_push
 
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.newton import solve_coulomb, solve_tied
-from gibiane_ops.kernels.contact.pairs import facets_of_body, node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.contact.outward import facets_of_body
 from gibiane_ops.kernels.contact.report import STICK
 from gibiane_ops.kernels.contact.status import solve_statuses
 from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence

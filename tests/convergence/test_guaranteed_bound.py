@@ -19,7 +19,7 @@ from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
-from gibiane_ops.kernels.contact.pairs import node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stress
 from gibiane_ops.kernels.estimate.contact_bound import contact_tractions

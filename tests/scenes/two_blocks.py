@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from gibiane_ops.kernels.assembly import assemble, assemble_vector, element_stiffness, pressure_load
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
-from gibiane_ops.kernels.contact.pairs import node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.contact.report import OPEN, SLIP
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic

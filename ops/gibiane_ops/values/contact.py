@@ -14,8 +14,9 @@ from gibiane_ops.kernels.contact.frames import local_frames
 from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.mortar import mortar_pairs
 from gibiane_ops.kernels.contact.node_facet import are_inside, node_facet_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs, with_surface
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
-from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs, with_surface
+from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.conditions import family
 from gibiane_ops.values.failures import worded

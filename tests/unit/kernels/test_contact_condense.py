@@ -8,7 +8,8 @@ from gibiane_ops.kernels.assembly import assemble, element_stiffness
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.newton import solve_coulomb
-from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.contact.pairs import ContactPairs, joined
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, SingularSystem
 from gibiane_ops.kernels.materials import isotropic

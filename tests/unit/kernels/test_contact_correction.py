@@ -13,7 +13,8 @@ from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.correction import Stalled, solve_corrected, tied_holds
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
-from gibiane_ops.kernels.contact.pairs import joined, node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.contact.pairs import joined
 from gibiane_ops.kernels.contact.pardiso_schur import PardisoSchur
 from gibiane_ops.kernels.contact.strategy import plan, solve_on_bodies
 from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence

@@ -11,8 +11,9 @@ from gibiane_ops.kernels.contact.clip import clip, fan
 from gibiane_ops.kernels.contact.facets import middles_of, surface_of, transformation
 from gibiane_ops.kernels.contact.mortar import mortar_pairs
 from gibiane_ops.kernels.contact.node_facet import are_inside, node_facet_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.contact.overlaps import overlaps
-from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, node_pairs
+from gibiane_ops.kernels.contact.pairs import ContactPairs, joined
 from gibiane_ops.kernels.contact.ties import tie_contact
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, EmptyContact

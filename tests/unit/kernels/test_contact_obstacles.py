@@ -10,8 +10,9 @@ from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.facets import integrals, surface_of
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
 from gibiane_ops.kernels.contact.newton import solve_coulomb
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
-from gibiane_ops.kernels.contact.pairs import ContactPairs, node_pairs
+from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import ContradictoryConditions, EmptyContact, TooLarge
 from gibiane_ops.kernels.materials import isotropic

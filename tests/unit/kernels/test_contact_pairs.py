@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from gibiane_ops.kernels.contact.pairs import _distinct, facets_of_body, joined, nodal_normals, node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.contact.outward import _distinct, facets_of_body, nodal_normals
+from gibiane_ops.kernels.contact.pairs import joined
 from gibiane_ops.kernels.errors import BadValue, EmptyContact
 
 # two unit squares in one plane, four QUA4 each, nodes 0-8 (slave, normal -z) and 9-17 (master, normal +z)

@@ -9,28 +9,19 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution
+from gibiane_ops.kernels.contact.follower import Follower
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.newton import solve_tied
 from gibiane_ops.kernels.contact.report import ContactState
 from gibiane_ops.kernels.contact.solver_error import solver_error
-from gibiane_ops.kernels.contact.tied import PASSES
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged, StatusCycle
 
 AGREEMENT = 1e-9
 """Largest difference between the forces of the small model and the true ones, over the largest force."""
 
-LOOSE = 1e-9
-"""Relative residual of the tied solution, for iterations, at which contact may stop."""
-
 MOST = 40
 """Corrections after which the loop is given up."""
-
-PARTLY = 1e-5
-"""Relative residual of a solution with a factor in single precision that suffices: one substitution, as a rule."""
-
-ENTIRELY = 1e-12
-"""And that of the result, over the load."""
 
 PATIENCE = 8
 """Corrections in a row without halving the best difference after which the loop is given up."""
@@ -165,7 +156,7 @@ def solve_corrected(
     """
     bodies.small()
     assert bodies.learned is not None
-    follower = _Follower(bodies, load)
+    follower = Follower(bodies, load)
     differences: list[float] = []
     before: ContactState | None = None
     left = 0.0
@@ -232,78 +223,3 @@ def solve_stuck(bodies: Condensation, load: TiedSolution, gap: FloatArray) -> Co
     zero = np.zeros(len(load.f))
     displacement = bodies.displacement(load, zero, np.zeros(len(load.x)))
     return Corrected(solve_tied(interface), interface, displacement, 0, False)
-
-
-class _Follower:
-    """The bodies themselves, that follow the relative displacements of the small model.
-
-    Attributes
-    ----------
-    w : (n d,) float64
-        Relative displacements so far.
-    x : (n_v,) float64
-        Solution of ``Kvv x = Kvw w``, but for ``rest``.
-    y : (n d,) float64
-        ``S w``.
-    rest : (n_v,) float64
-        What is left of the equations of x; each solution takes the rest of the one before with it.
-    """
-
-    def __init__(self, bodies: Condensation, load: TiedSolution) -> None:
-        self._bodies, self._load = bodies, load
-        self._tied = bodies.tied
-        self._size = float(np.linalg.norm(self._tied.A @ load.x))
-        self.w, self.y = np.zeros(len(load.f)), np.zeros(len(load.f))
-        self.x, self.rest = np.zeros(len(load.x)), np.zeros(len(load.x))
-
-    def interface(self, gap: FloatArray) -> Interface:
-        """Put together the interface whose force on w is the true one, ``y - f``."""
-        learned = self._bodies.learned
-        assert learned is not None
-        f = self._load.f
-        if not self._tied.exact:
-            f = learned.still(learned.S @ self.w - self.y) + f
-        return replace(self._bodies.interface_of(self._load, learned, gap), f=f)
-
-    def move(self, w: FloatArray) -> None:
-        """Go to w with one solution, which takes the rest of the one before with it."""
-        bodies, tied = self._bodies, self._tied
-        assert bodies.learned is not None
-        if tied.direct:
-            # of the change alone: round-off of a body that has slid far would hide the last corrections
-            dw = w - self.w
-            self.rest = self.rest + bodies.coupling(dw)
-            self.w = w
-            self._correct(dw, PARTLY)
-            return
-        right = bodies.coupling(w)
-        if not self.x.any():
-            self.x = bodies.recalled(w)
-        x = self.x + tied.once(right - tied.A @ self.x)
-        x = x + bodies.small().solve(right - tied.A @ x)
-        self.w, self.x, self.rest = w, x, right - tied.A @ x
-        self.y = bodies.learned.still(bodies.force(w, x))
-
-    def settle(self) -> bool:
-        """Solve for the rest, until the displacement is as accurate as the forces; tell whether it was not."""
-        tied = self._tied
-        size = max(float(np.linalg.norm(self._bodies.coupling(self.w))), self._size)
-        wanted = ENTIRELY if tied.direct else LOOSE
-        for count in range(PASSES):
-            if float(np.linalg.norm(self.rest)) <= wanted * size:
-                return count > 0
-            if tied.direct:
-                self._correct(np.zeros(len(self.w)), wanted * size / float(np.linalg.norm(self.rest)))
-            else:
-                dx = tied.once(self.rest)
-                self.x, self.rest = self.x + dx, self.rest - tied.A @ dx
-        return True
-
-    def _correct(self, dw: FloatArray, tolerance: float) -> None:
-        """Solve for the rest, to a relative residual, and add a change of w whose force the rest holds."""
-        dx = self._tied.once(self.rest, tolerance)
-        self.x = self.x + dx
-        self.rest = self.rest - self._tied.A @ dx
-        learned = self._bodies.learned
-        assert learned is not None
-        self.y = self.y + learned.still(self._bodies.force(dw, dx))

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.contact.pairs import FACING, ROUND_OFF, ContactPairs, nodal_normals
+from gibiane_ops.kernels.contact.outward import nodal_normals
+from gibiane_ops.kernels.contact.pairs import FACING, ROUND_OFF, ContactPairs
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
 from gibiane_ops.kernels.topology import Block
