@@ -22,9 +22,6 @@ from gibiane_ops.values.nodes import FloatArray
 from gibiane_ops.values.solving import ELASTIC
 from gibiane_ops.values.system import System
 
-RATE = 3e10
-"""Operations a second that predictions of time assume."""
-
 LONG = 10.0
 """Seconds from which the duration is announced and the progress shown."""
 
@@ -57,8 +54,7 @@ def way_of(ctx: Context, system: System, pairs: ContactPairs, reduction: Reducti
     if ctx.option("ECHO") >= 1:
         how = "condensed on" if chosen.exact else "corrected on a small model of"
         solver = METHODS.get(chosen.method, "a factor")
-        seconds = chosen.work / RATE
-        duration = f", {seconds:.0f} s" if seconds > LONG else ""
+        duration = f", {chosen.seconds:.0f} s" if chosen.seconds > LONG else ""
         ctx.write(
             f" RESO : {n} equations of tied solids by {solver}, contact {how} {len(pairs.pairs)} pairs, "
             f"about {chosen.memory / 1e9:.2g} Gbyte{duration}"
