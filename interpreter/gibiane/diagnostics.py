@@ -26,6 +26,7 @@ LEVELS: dict[str, int] = {
     "G416": WARNING,
     "G417": WARNING,
     "G418": NOTE,
+    "G419": WARNING,
     "G900": FATAL,
 }
 G_CODES = {
@@ -53,6 +54,7 @@ G_CODES = {
     "G416": "result of an approximate contact law",
     "G417": "slips beyond the facets of the start",
     "G418": "contact stopped early because the user asked for it",
+    "G419": "flat elements in a new mesh",
     "G501": "file cut or of unknown format",
     "G601": "workers of a study are lost",
     "G602": "no cluster answers",

@@ -75,6 +75,8 @@ MESH = {
     "a field of sizes has the component SCAL (edge length) or G (its square inverse), not {names}": "un champ de tailles a la composante SCAL (longueur d'arête) ou G (son inverse au carré), non {names}",
     "in space a mesh cannot follow sizes that depend on the direction (components {names})": "dans l'espace un maillage ne peut pas suivre des tailles selon la direction (composantes {names})",
     "G = det(M)**(1/3) asks for as many elements without direction": "G = det(M)**(1/3) demande autant d'éléments sans direction",
+    "{count} elements of the new mesh are nearly flat: {which}; the worst, of quality {least}, is at ({place})": "{count} éléments du nouveau maillage sont presque plats : {which} ; le pire, de qualité {least}, est en ({place})",
+    "smaller sizes where the domain is thin; INDI 'TOPO' shows the quality of each element": "des tailles plus petites où le domaine est mince ; INDI 'TOPO' montre la qualité de chaque élément",
     "a metric has the components {wanted}, not {names}": "une métrique a les composantes {wanted}, et non {names}",
     "TAILLE 'METRIQUE' makes such a field": "TAILLE 'METRIQUE' donne un tel champ",
     "a metric has positive lengths in every direction: that of {count} nodes has not": "une métrique a des longueurs positives dans toutes les directions : celle de {count} noeuds n'en a pas",

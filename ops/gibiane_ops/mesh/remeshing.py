@@ -9,9 +9,10 @@ from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, TABLE, Table
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.adapt.sizes import element_sizes, predicted_count
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import MeshingFailed
-from gibiane_ops.kernels.mesh import unions
+from gibiane_ops.kernels.mesh import quality, unions
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
 from gibiane_ops.mesh.filling import fill_contour, fill_envelope, metric_at, sizes_at
@@ -19,6 +20,9 @@ from gibiane_ops.mesh.groups import Groups
 from gibiane_ops.mesh.local import divide, move_nodes
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.maillage import Maillage
+
+FLAT = 0.05
+"""Mean ratio (INDI 'TOPO') below which an element is told to be nearly flat: a regular one has 1."""
 
 NEAR_ENOUGH = 0.05
 """Relative difference of the number of elements below which a mesh whose boundary is kept is left as it is."""
@@ -95,8 +99,29 @@ def _remesh(
 
     _, near = cKDTree(store.coords[nodes][:, :dim]).query(result.points)
     ids = store.add(result.points, store.density[nodes][near])
+    if metric is None:
+        _warn_flat(ctx, result.points, result.cells)
     mesh = finished(ctx, new_mesh(ctx, [(wanted, ids[result.cells])]), quadratic)
     return mesh, groups.renewed(result.groups, ids)
+
+
+def _warn_flat(ctx: Context, points: FloatArray, cells: IntArray) -> None:
+    """Tell of the elements that the mesher and its optimisation left nearly flat, with the place of the worst."""
+    ratio = quality.mean_ratio(points[cells])
+    flat = np.flatnonzero(ratio < FLAT)
+    if not len(flat):
+        return
+    worst = flat[np.argsort(ratio[flat], kind="stable")]
+    ctx.warn(
+        "G419",
+        "{count} elements of the new mesh are nearly flat: {which}; the worst, of quality {least}, is at ({place})",
+        at="g",
+        count=len(flat),
+        which=" ".join(str(k + 1) for k in worst[:5].tolist()) + (" ..." if len(worst) > 5 else ""),
+        least=f"{ratio[worst[0]]:.3g}",
+        place=" ".join(f"{x:.4g}" for x in points[cells[worst[0]]].mean(axis=0)),
+        hint="smaller sizes where the domain is thin; INDI 'TOPO' shows the quality of each element",
+    )
 
 
 @REMA.form(
