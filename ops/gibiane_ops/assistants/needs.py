@@ -31,9 +31,17 @@ def called(session: Any, values: Iterable[Any]) -> dict[str, Any]:
         value = visible[word]
         if session.operator(word) is not None or (only_procedures and not isinstance(value, Procedure)):
             continue
+        if isinstance(value, Procedure) and _shipped(session, word, value):
+            continue  # a worker finds it by its name, whether this session has read it already or not
         found[word] = value
         waiting.extend(words([value]))
     return found
+
+
+def _shipped(session: Any, name: str, procedure: Procedure) -> bool:
+    """Say whether a procedure was read from a file of its own name."""
+    source = session.library.find(name)
+    return source is not None and source.text == procedure.program[procedure.start - 1].source.text
 
 
 def words(values: Iterable[Any], depth: int = 0) -> Iterator[tuple[str, bool]]:
@@ -63,9 +71,16 @@ def free_words(procedure: Procedure) -> list[tuple[str, bool]]:
     """
     scopes: list[set[str]] = [{parameter.name for parameter in procedure.parameters}]
     found: dict[tuple[str, bool], None] = {}
+    branches: list[set[str]] = []
     for instr in procedure.program[procedure.start : procedure.end]:
         if instr.head in ("FINS", "FIN", "SINO") and len(scopes) > 1:
-            scopes.pop()
+            ended = scopes.pop()
+            if instr.head == "SINO":
+                branches[-1] = ended
+            elif instr.head == "FINS" and branches:
+                scopes[-1].update(ended & branches.pop())  # given in both branches
+        if instr.head == "SI":
+            branches.append(set())
         if instr.head in ("SI", "SINO", "REPE"):
             scopes.append(set())
         if instr.head == "ARGU":
