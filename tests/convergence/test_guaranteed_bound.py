@@ -139,6 +139,9 @@ class Scene:
         )  # fmt: skip
 
 
+MISSED = pytest.mark.xfail(strict=True, reason="two sweeps leave 1.257 times the error, the aim is 1.25")
+
+
 @lru_cache
 def scene(side, h, merged):
     return Scene(side, h, merged)
@@ -154,6 +157,7 @@ def effectivity(of, found, exact, contact=0.0):
     [
         (200.0, 100.0), (200.0, 50.0), (50.0, 25.0),
         pytest.param(200.0, 25.0, marks=pytest.mark.slow), pytest.param(50.0, 12.5, marks=pytest.mark.slow),
+        pytest.param(50.0, 25.0 / 3, marks=[pytest.mark.slow, MISSED]),
     ],
 )  # fmt: skip
 def test_bonded_blocks(side, h):
