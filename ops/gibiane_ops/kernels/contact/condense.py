@@ -8,6 +8,7 @@ of the tied bodies, positive definite as soon as one of them is held. Eliminatin
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -131,7 +132,7 @@ class Condensation:
             else:
                 candidates = rigid_candidates(self.contact, self.frames, self.active)
             energy = candidates.T @ S @ candidates
-            self._exact = PairStiffness.of(S, self.active, self._elastic(), candidates, energy, exact=True)
+            self._exact = PairStiffness.of(S, self.active, self._elastic, candidates, energy, exact=True)
         return self._exact
 
     def small(self) -> SmallModel:
@@ -144,7 +145,7 @@ class Condensation:
             moved = self._fields.Bw @ candidates - self._fields.Bv @ self._small.solve(self._Kvw @ candidates)
             energy = moved.T @ (self._K @ moved)
             self.learned = PairStiffness.of(
-                self._small.S, self.active, self._elastic(), candidates, energy, exact=False
+                self._small.S, self.active, self._elastic, candidates, energy, exact=False
             )  # fmt: skip
         return self._small
 
@@ -224,7 +225,7 @@ class Condensation:
     def unloaded_stiffness(self) -> PairStiffness:
         """Give an empty stiffness, for what needs no more than the geometry of the pairs and their load."""
         size = self.active.size
-        return PairStiffness(sp.csr_array((size, size)), self._elastic(), np.zeros((size, 0)), False)
+        return PairStiffness(sp.csr_array((size, size)), self._elastic, np.zeros((size, 0)), False)
 
     def displacement(self, solution: TiedSolution, w: FloatArray, x: FloatArray) -> FloatArray:
         """Compute the displacement of every unknown from w, (n d,), and x with ``Kvv x = Kvw w``."""
@@ -283,6 +284,7 @@ class Condensation:
     def _Kww(self) -> FloatArray:
         return np.asarray((self._fields.Bw.T @ self._KBw).toarray())
 
+    @cached_property
     def _elastic(self) -> float:
         return float(self._K.diagonal().mean())
 
