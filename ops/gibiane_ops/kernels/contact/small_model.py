@@ -26,8 +26,8 @@ NODES_PER_CELL = 8
 SHIFT = 1e-13
 """Share of its diagonal added to the small matrix: on odd meshes some coarse functions depend on others."""
 
-BLOCK = 64
-"""Right-hand sides solved together."""
+BLOCK = 32
+"""Right-hand sides solved together: of 867 on 13 600 unknowns, 0.9 s by 32, 1.2 s by 64 or 16."""
 
 
 @dataclass(frozen=True, eq=False)
