@@ -206,10 +206,15 @@ def _read(ctx: Context, q: Operands) -> tuple[Modele, dict[str, Any], _Axes | No
             model = q.read(MMODEL)
             if model is not None:
                 continue
-        if q.first_word() != 0 or q.is_operator_word(0):
+        if q.first_word() != 0:
             break
         node = q.nodes[0]
-        word = q.read_keyword(DIRECTIONS) if model is not None and any(z.orthotropic for z in model.zones) else None
+        # PARALLELE and RADIAL are read before operators of the same letters, as any keyword in its place.
+        directed = model is not None and any(z.orthotropic for z in model.zones)
+        operator_word = q.is_operator_word(0)
+        word = q.read_keyword(DIRECTIONS) if directed else None
+        if word is None and operator_word:
+            break
         if word in ("DIRECTION", "RADIAL"):
             points = [q.need(POINT, word)]
             if len(q.values) and (second := q.read(POINT)) is not None:

@@ -41,6 +41,7 @@ U = NOMC 'UZ' (1.E-3 * (COOR 3 V)) ;
 """
 
 ORDER = Key(("LINE", "QUAD"), "linear strains (the default), or those of Green and Lagrange", name="how")
+OTHER_STRAINS = ("TRUE", "JAUM", "UTIL")
 
 
 EPSI = operator(
@@ -57,9 +58,22 @@ EPSI = operator(
 
 
 @EPSI.form(
-    Arg("model", MMODEL, "model"), Arg("u", CHPOINT, "displacement"), ORDER, Key("NOER", "accepted"), gives=[MCHAML]
+    Key(OTHER_STRAINS, "not available", name="other"),
+    Arg("model", MMODEL, "model"),
+    Arg("u", CHPOINT, "displacement"),
+    ORDER,
+    Key("NOER", "accepted"),
+    gives=[MCHAML],
 )
-def _epsi(ctx: Context, model: Modele, u: ChPoint, how: str | None, noer: bool) -> MChaml:
+def _epsi(ctx: Context, other: str | None, model: Modele, u: ChPoint, how: str | None, noer: bool) -> MChaml:
+    if other is not None:
+        ctx.fail(
+            251,
+            "EPSI '{how}' is not available: strains are linear, or those of Green and Lagrange",
+            at="other",
+            how=other,
+            hint="EPSI 'QUAD' holds for large rotations",
+        )
     quadratic = how == "QUAD"
     zones = [ChamZone(z, z.strains, mechanics.strains(ctx, z, u, quadratic=quadratic)) for z in solid_zones(ctx, model)]
     return MChaml(zones, STRAIN, "STRESSES")

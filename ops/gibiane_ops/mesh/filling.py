@@ -64,7 +64,7 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
     return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
 
 
-METRIC = {2: ("G11", "G21", "G22")}
+METRIC = {2: ("G11", "G21", "G22"), 3: ("G11", "G21", "G22", "G31", "G32", "G33")}
 """Components of a metric by dimension: the rows of the lower triangle."""
 
 
@@ -74,19 +74,10 @@ def metric_at(ctx: Context, size: Size, nodes: IntArray, dim: int) -> FloatArray
     Raises
     ------
     GibianeError
-        181 for a field without all the components, or that misses nodes; 41 for a metric that is not positive; 251 in
-        space, where the mesher of gmsh (MMG3D) did not come back within a minute for 800 tetrahedra.
+        181 for a field without all the components, or that misses nodes; 41 for a metric that is not positive.
     """
     if not isinstance(size, ChPoint) or not {"G11", "G22"} & set(size.names):
         return None
-    if dim == 3:
-        ctx.fail(
-            251,
-            "in space a mesh cannot follow sizes that depend on the direction (components {names})",
-            at="size",
-            names=" ".join(size.names),
-            hint="G = det(M)**(1/3) asks for as many elements without direction",
-        )
     wanted = METRIC[dim]
     if not set(wanted) <= set(size.names):
         ctx.fail(
@@ -119,7 +110,9 @@ def metric_at(ctx: Context, size: Size, nodes: IntArray, dim: int) -> FloatArray
             "a metric has positive lengths in every direction: that of {count} nodes has not",
             at="size",
             count=int(bad.sum()),
-            hint="G11 G22 - G21**2 and G11 are above 0; a size h in every direction is G11 = G22 = 1/h**2",
+            hint="G11 G22 - G21**2 and G11 are above 0; a size h in every direction is G11 = G22 = 1/h**2"
+            if dim == 2
+            else "a size h in every direction is G11 = G22 = G33 = 1/h**2",
         )
     return result
 

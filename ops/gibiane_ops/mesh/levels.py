@@ -23,20 +23,24 @@ ISOV = operator(
     notice="`G2 = ISOV G CHPO x`, x a number or a LISTREEL: points on lines, SEG2 on surfaces, TRI3 in volumes, where "
     "the field of one component is x, linear between nodes (other elements than simplices are cut, mid-nodes do not "
     "count). `G2 = ISOV CHAM ('EGAL') x`: likewise for an element field at nodes, of which each node takes the mean. "
-    "Triangles look to the side of higher values. The nodes are new; an empty result is a warning.",
+    "Triangles look to the side of higher values. The nodes are new; an empty result is a warning. `G2 = ISOV G CHPO "
+    "'EGSUPE' x` and `ISOV CHAM 'EGSUPE' x` give the part where the field is x or more, 'EGINFE' x or less: elements "
+    "that are cut, and all others than simplices, become TRI3 or TET4; the nodes inside are those of the mesh.",
     example="OPTI DIME 2 ELEM QUA4 ; S = (DROIT 4 (0. 0.) (1. 0.)) TRAN 4 (0. 1.) ; "
     "L = ISOV S (COOR 1 S) 0.3 ; MESS (MESU L) ;",
     see=["TRACER", "POINT"],
 )
+SIDE = Key(("EGAL", "EGINFE", "EGSUPE"), "equal (the usual), at most, at least", name="side")
 
 
 @ISOV.form(
     Arg("g", MAILLAGE, "mesh"),
     Arg("field", CHPOINT, "field"),
+    SIDE,
     Arg("x", (FLOTTANT, LISTREEL), "values"),
     gives=[MAILLAGE],
 )
-def _nodal(ctx: Context, g: Maillage, field: ChPoint, x: float | ListReel) -> Maillage:
+def _nodal(ctx: Context, g: Maillage, field: ChPoint, side: str | None, x: float | ListReel) -> Maillage:
     if len(field.names) != 1:
         ctx.fail(21, "the field has {count} components: name one", at="field", count=len(field.names))
     name = field.names[0]
@@ -45,18 +49,16 @@ def _nodal(ctx: Context, g: Maillage, field: ChPoint, x: float | ListReel) -> Ma
         ctx.fail(181, "the field has no value at {count} nodes of the mesh", at="field", count=len(missing))
     values = np.zeros(nodes_of(ctx).count)
     values[field.parts[name][0]] = field.parts[name][1]
-    return _levels(ctx, g, values, x)
+    return _part(ctx, g, values, side, x)
 
 
 @ISOV.form(
     Arg("field", MCHAML, "element field at nodes"),
-    Key(("EGAL", "EGINFE", "EGSUPE"), "equal; the others are not available", name="how"),
+    SIDE,
     Arg("x", (FLOTTANT, LISTREEL), "values"),
     gives=[MAILLAGE],
 )
-def _elements(ctx: Context, field: MChaml, how: str | None, x: float | ListReel) -> Maillage:
-    if how in ("EGINFE", "EGSUPE"):
-        ctx.fail(251, "ISOV '{how}' is not available", at="how", how=how, hint="CH ELEM '{how}' x gives whole elements")
+def _elements(ctx: Context, field: MChaml, side: str | None, x: float | ListReel) -> Maillage:
     if field.support != "NOEUD" or len(field.names) != 1:
         ctx.fail(
             21,
@@ -73,7 +75,28 @@ def _elements(ctx: Context, field: MChaml, how: str | None, x: float | ListReel)
             meshes.append(zone.zone.mesh)
     if not meshes:
         ctx.fail(21, "there is no solid zone", at="field")
-    return _levels(ctx, join(meshes), total / np.maximum(count, 1.0), x)
+    return _part(ctx, join(meshes), total / np.maximum(count, 1.0), side, x)
+
+
+def _part(ctx: Context, g: Maillage, values: FloatArray, side: str | None, x: float | ListReel) -> Maillage:
+    if side in (None, "EGAL"):
+        return _levels(ctx, g, values, x)
+    if isinstance(x, ListReel):
+        ctx.fail(21, "'{side}' wants one value, not a LISTREEL", at="x", side=side)
+    dimension(ctx)
+    store, sign = nodes_of(ctx), 1.0 if side == "EGSUPE" else -1.0
+    blocks = [_simplices(block.shape, block.cells) for block in linear_mesh(ctx, g).blocks]
+    parts: list[tuple[str, IntArray]] = []
+    for d in sorted({cells.shape[1] for cells in blocks}):
+        cells = np.concatenate([each for each in blocks if each.shape[1] == d])
+        places, kept = levels.clip(store.coords, cells, sign * values, sign * float(x))
+        ids = np.concatenate([np.arange(store.count), store.add(places, float(ctx.option("DENS")))])
+        if len(kept):
+            parts.append((("POI1", "SEG2", "TRI3", "TET4")[d - 1], ids[kept]))
+        values = np.concatenate([values, np.full(len(places), float(x))])
+    if not parts:
+        ctx.warn(26, "the field has such values nowhere: the mesh is empty")
+    return new_mesh(ctx, parts)
 
 
 def _levels(ctx: Context, g: Maillage, values: FloatArray, x: float | ListReel) -> Maillage:

@@ -78,6 +78,15 @@ def _remesh(
         )
     store = nodes_of(ctx)
     nodes = g.nodes
+    if dim == 3 and isinstance(size, ChPoint) and {"G11", "G22"} & set(size.names):
+        # The mesher of gmsh (MMG3D) did not come back within a minute for 800 tetrahedra.
+        ctx.fail(
+            251,
+            "in space a mesh cannot follow sizes that depend on the direction (components {names})",
+            at="size",
+            names=" ".join(size.names),
+            hint="G = det(M)**(1/3) asks for as many elements without direction",
+        )
     metric = metric_at(ctx, size, nodes, dim)
     sizes = sizes_at(ctx, size, nodes) if metric is None else metric
     groups = Groups(ctx, grou if grou is not None else Table(), nodes)

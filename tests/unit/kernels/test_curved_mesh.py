@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import SHAPES
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
-from gibiane_ops.kernels.mesh import charts, curves, levels, quality, seams
+from gibiane_ops.kernels.mesh import charts, curves, levels, quality, seams, simplices
 
 Z = np.array([0.0, 0.0, 1.0])
 O = np.zeros(3)  # noqa: E741
@@ -142,3 +143,61 @@ def test_the_worst_corner_of_perfect_and_bad_elements(name: str) -> None:
     assert quality.corner_ratio(name, mirrored[None]) == pytest.approx([0.0])
     stretched = quality.corner_ratio(name, (ideal * ([3.0] + [1.0] * (ideal.shape[1] - 1)))[None])
     assert 0.1 < stretched[0] < 0.9
+
+
+@pytest.mark.parametrize("d", [1, 2, 3, 4])
+def test_parts_of_simplices_fill_them_and_fit(d: int) -> None:
+    rng = np.random.default_rng(d)
+    if d == 4:
+        grid = np.array([[i, j, k] for k in range(3) for j in range(3) for i in range(3)], float)
+        at = [i + 3 * j + 9 * k for k in range(2) for j in range(2) for i in range(2)]
+        cells = simplices.tetrahedra(
+            "CUB8", np.array([[a, a + 1, a + 4, a + 3, *(a + np.array([9, 10, 13, 12]))] for a in at])
+        )[0]
+        points = grid + 0.1 * rng.standard_normal(grid.shape)
+    else:
+        points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+        cells = {1: np.arange(4)[:, None], 2: np.array([[0, 1], [2, 1], [2, 3]]), 3: np.array([[0, 1, 2], [2, 3, 0]])}[
+            d
+        ]
+
+    def measure(x: FloatArray, c: IntArray) -> FloatArray:
+        """Signed for tetrahedra and triangles of the plane z = 0."""
+        if d == 1:
+            return np.ones(len(c))
+        sides = x[c[:, 1:]] - x[c[:, :1]]
+        if d == 2:
+            return np.linalg.norm(sides[:, 0], axis=1)
+        if d == 3:
+            return np.cross(sides[:, 0], sides[:, 1])[:, 2] / 2
+        return np.linalg.det(sides) / 6
+
+    for _ in range(20):
+        # Whole numbers: the value is often that of a node.
+        values = rng.integers(0, 4, len(points)).astype(float)
+        total = 0.0
+        for sign in (1.0, -1.0):
+            places, kept = levels.clip(points, cells, sign * values, sign * 1.5)
+            x = np.vstack([points, places])
+            parts = measure(x, kept)
+            assert (parts > 0).all()
+            total += parts.sum()
+            if d == 4 and len(kept):
+                faces = np.sort(kept[:, [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]].reshape(-1, 3), axis=1)
+                unique, owners = np.unique(faces, axis=0, return_counts=True)
+                assert owners.max() <= 2
+                once = unique[owners == 1]
+                edges = np.sort(once[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+                assert (np.unique(edges, axis=0, return_counts=True)[1] % 2 == 0).all()  # a closed skin
+        assert total == pytest.approx(measure(points, cells).sum())
+        at_node, kept = levels.clip(points, cells, values, 2.0)
+        assert (measure(np.vstack([points, at_node]), kept) > 0).all()
+
+
+def test_direction_of_parts_of_segments_is_kept() -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0]], float)
+    for cells in (np.array([[0, 1]]), np.array([[1, 0]])):
+        for sign in (1.0, -1.0):
+            places, kept = levels.clip(points, cells, sign * points[:, 0], sign * 0.25)
+            x = np.vstack([points, places])[kept[0], 0]
+            assert np.sign(x[1] - x[0]) == np.sign(cells[0, 1] - cells[0, 0])

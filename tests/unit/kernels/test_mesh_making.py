@@ -407,6 +407,25 @@ def test_contours_and_sharp_edges_of_a_box():
 # ---------------------------------------------------------------- quality
 
 
+@pytest.mark.parametrize("d", [2, 3])
+def test_quality_in_a_metric_is_that_of_the_element_where_lengths_are_measured_so(d):
+    triangle = np.array([[0, 0], [1, 0], [0.5, math.sqrt(0.75)]])
+    tetrahedron = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]], float) / math.sqrt(2)
+    unit = triangle if d == 2 else tetrahedron
+    rng = np.random.default_rng(d)
+    A = rng.standard_normal((d, d))
+    M = np.linalg.inv(A).T @ np.linalg.inv(A)
+    assert quality.metric_quality((unit @ A.T)[None], M[None]) == pytest.approx([1])
+    # Twice as large or as small: s = 1/2.
+    for factor in (4.0, 0.25):
+        assert quality.metric_quality((unit @ A.T)[None], factor * M[None]) == pytest.approx([0.75**3])
+    some = rng.standard_normal((1, d + 1, d))
+    assert 0 < quality.metric_quality(some, np.eye(d)[None])[0] < quality.mean_ratio(some)[0]
+    some[..., -1] = 0.0
+    # A volume is the root of a determinant of rounding errors, and taken to the power 2/3.
+    assert quality.metric_quality(some, np.eye(d)[None]) == pytest.approx([0], abs=2 * np.finfo(float).eps ** (1 / 3))
+
+
 def test_quality_of_equilateral_right_and_flat_elements():
     triangle = np.array([[0, 0], [1, 0], [0.5, math.sqrt(0.75)]])
     tetrahedron = np.array([[0, 0, 0], [1, 1, 0], [1, 0, 1], [0, 1, 1]], float)

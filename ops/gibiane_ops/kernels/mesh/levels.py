@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.mesh import simplices
 
 # A cut nearer to a node than this part of the edge is that node.
 AT_NODE = 1e-12
@@ -73,6 +74,71 @@ def level(points: FloatArray, cells: IntArray, values: FloatArray, at: float) ->
     made = _turned(places, made, points[cells[owner]], above[cells[owner]])
     used, number = np.unique(made, return_inverse=True)
     return places[used], number.reshape(made.shape)
+
+
+def clip(points: FloatArray, cells: IntArray, values: FloatArray, at: float) -> tuple[FloatArray, IntArray]:
+    """Keep the part of simplices where a field that is linear in each is at least a value.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, length
+    cells : (m, d + 1) int64
+        Points, segments, triangles or tetrahedra (of positive volume).
+    values : (n,) float64
+        At the points.
+    at : float
+
+    Returns
+    -------
+    points : (k, 3) float64, length
+        New points, on the edges that are cut; point i of these has the number n + i in the cells.
+    cells : (p, d + 1) int64
+        Simplices that turn like those they are parts of; neighbours fit, because the cut of a quadrangle depends on
+        the numbers of its corners only.
+    """
+    n, d = len(points), cells.shape[1]
+    outside = values[cells] < at
+    order = np.argsort(outside, axis=1, kind="stable")
+    count = d - outside.sum(axis=1)
+    # An even permutation brings the corners that are kept to the front, so that the pieces turn like the whole.
+    odd = np.linalg.det(np.eye(d)[order]) < 0 if len(cells) else np.zeros(0, bool)
+    swap = np.array([1, 0, *range(2, d)]), np.array([*range(d - 2), d - 1, d - 2])
+    if d > 2:
+        order = np.where(odd[:, None], np.where((count > 1)[:, None], order[:, swap[0]], order[:, swap[1]]), order)
+    front = np.take_along_axis(cells, order, axis=1)
+    ends = np.sort(front[:, np.array(EDGES[d])].reshape(-1, 2), axis=1) if d > 1 else np.zeros((0, 2), np.int64)
+    ends = np.unique(ends[(values[ends] < at).sum(axis=1) == 1], axis=0)
+    part = (at - values[ends[:, 0]]) / (values[ends[:, 1]] - values[ends[:, 0]])
+    near = [part < AT_NODE, part > 1 - AT_NODE]
+    made = ~near[0] & ~near[1]
+    ids = np.select(near, [ends[:, 0], ends[:, 1]], n + np.cumsum(made) - 1)
+    places = points[ends[:, 0]] + part[:, None] * (points[ends[:, 1]] - points[ends[:, 0]])
+    keys = ends[:, 0] * n + ends[:, 1]
+
+    def cut(a: IntArray, b: IntArray) -> IntArray:
+        return np.asarray(ids[np.searchsorted(keys, np.minimum(a, b) * n + np.maximum(a, b))], np.int64)
+
+    parts = [front[count == d]]
+    for kept in range(1, d):
+        c = front[count == kept].T
+        if d == 2:
+            first = outside[count == kept, 1]
+            end = cut(c[0], c[1])
+            parts.append(np.where(first[:, None], np.stack([c[0], end], 1), np.stack([end, c[0]], 1)))
+        elif kept == 1:
+            parts.append(np.stack([c[0], *(cut(c[0], other) for other in c[1:])], axis=1))
+        elif d == 3:
+            quadrangles = np.stack([c[0], c[1], cut(c[1], c[2]), cut(c[0], c[2])], axis=1)
+            parts.append(simplices.triangles_of_quadrangles(quadrangles))
+        else:
+            if kept == 3:
+                prism = [c[0], c[1], c[2], cut(c[0], c[3]), cut(c[1], c[3]), cut(c[2], c[3])]
+            else:
+                prism = [c[0], cut(c[0], c[2]), cut(c[0], c[3]), c[1], cut(c[1], c[2]), cut(c[1], c[3])]
+            parts.append(simplices.tetrahedra("PRI6", np.stack(prism, axis=1))[0])
+    found = np.concatenate(parts)
+    ranked = np.sort(found, axis=1)
+    return places[made], found[(ranked[:, 1:] != ranked[:, :-1]).all(axis=1)]
 
 
 def _turned(places: FloatArray, made: IntArray, X: FloatArray, above: FloatArray) -> IntArray:
