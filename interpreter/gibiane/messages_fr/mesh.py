@@ -43,6 +43,10 @@ MESH = {
     "was the distance given to ELIM larger than the elements?": "la distance donnée à ELIM dépassait-elle la taille des éléments ?",
     "a volume or a surface is wanted, this mesh holds {shapes}": "il faut un volume ou une surface, ce maillage contient {shapes}",
     "a {type} cannot be moved": "un {type} ne se déplace pas",
+    "sides of {first} and {second} elements face each other: their sum must be even": "des côtés de {first} et {second} éléments se font face : leur somme doit être paire",
+    "change one of them by one": "changer l'un d'eux d'une unité",
+    "a number of layers is above 0: {value} cannot be one": "un nombre de couches dépasse 0 : {value} ne peut en être un",
+    "a grid of QUA4 or QUA8 is wanted, this mesh holds {shapes}": "il faut une grille de QUA4 ou QUA8, ce maillage contient {shapes}",
     # selection
     "no element of the mesh is like that": "aucun élément du maillage n'est ainsi",
     "the two points are one: nothing is between them": "les deux points n'en font qu'un : rien n'est entre eux",

@@ -28,7 +28,8 @@ from gibiane_ops.mesh.building import (
     reference,
     reversed_mesh,
 )
-from gibiane_ops.mesh.degree import every_node, finished, linear_mesh
+from gibiane_ops.mesh.degree import every_node, finished, is_quadratic, linear_mesh
+from gibiane_ops.mesh.facing import between_grids
 from gibiane_ops.mesh.sweeping import Base, add_layers, base_of
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.listes import ListReel
@@ -47,7 +48,10 @@ VOLU = operator(
     "or OPTI ELEM of second degree, CU20 and PR15. Without N or "
     "with N negative, densities (or 'DINI' and 'DFIN') give the layers, as in DROIT; 'PROG' with a "
     "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
-    "volume in place of S is prolonged from its face 2. `V = S VOLU e V` puts one layer of elements around "
+    "volume in place of S is prolonged from its face 2. `V = S1 VOLU S2 P1 P2 N` joins two grids of QUA4 that may "
+    "differ in numbers of rows and columns, if the sum of both numbers is even: P1 is a corner of S1, P2 the corner of "
+    "S2 that faces it; N layers (1) of the same thickness, of which the first takes the change of columns and the last that of "
+    "rows (a single layer is halved when both change). `V = S VOLU e V` puts one layer of elements around "
     "a surface, of thickness e (or a CHPOINT), half on each side along its normals; V tells the outside. "
     "`V = ENV VOLU` alone fills a closed envelope of triangles with tetrahedra.",
     example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "
@@ -133,11 +137,7 @@ def _sweep(
         parts.insert(0, linear_mesh(ctx, extended))
     if after is not None:
         parts.append(linear_mesh(ctx, after))
-    if len(parts) == 1:
-        return finished(ctx, parts[0], base.quadratic)
-    lateral = join([part.sides["3"] for part in parts if "3" in part.sides])
-    whole = join(parts, {"1": parts[0].sides["1"], "2": parts[-1].sides["2"], "3": lateral})
-    return finished(ctx, whole, base.quadratic)
+    return finished(ctx, _together(parts), base.quadratic)
 
 
 def _outward(name: str, cells: IntArray, turn: BoolArray) -> IntArray:
@@ -213,6 +213,41 @@ def _generated(ctx: Context, s: Maillage, gene: Maillage) -> Maillage:
     steps = every_node(ctx, line) if base.quadratic else np.repeat(line, 2)[:-1]
     x, path = base.places, store.coords[steps] - store.coords[line[0]]
     return _sweep(ctx, base, lambda t: x + path[round(2 * t)], rank, (density, density), extended)
+
+
+@VOLU.form(
+    Arg("s", MAILLAGE, "grid of quadrangles"),
+    Arg("last", MAILLAGE, "grid that faces it"),
+    Arg("p1", POINT, "corner of the first"),
+    Arg("p2", POINT, "corner of the second, that faces it"),
+    COUNT,
+    Key("DINI", "accepted", Arg("d", FLOTTANT)),
+    Key("DFIN", "accepted", Arg("d", FLOTTANT)),
+    gives=[MAILLAGE],
+)
+def _facing(
+    ctx: Context,
+    s: Maillage,
+    last: Maillage,
+    p1: Point,
+    p2: Point,
+    n: int | None,
+    dini: float | None,
+    dfin: float | None,
+) -> Maillage:
+    first, extended = _base(ctx, s, "s", "2")
+    second, after = _base(ctx, last, "last", "1")
+    made = between_grids(ctx, first, second, p1, p2, n)
+    parts = [linear_mesh(ctx, part) for part in (extended, made, after) if part is not None]
+    return finished(ctx, _together(parts), is_quadratic(made))
+
+
+def _together(parts: list[Maillage]) -> Maillage:
+    """Join volumes made one on the other, with the faces of the whole."""
+    if len(parts) == 1:
+        return parts[0]
+    lateral = join([part.sides["3"] for part in parts if "3" in part.sides])
+    return join(parts, {"1": parts[0].sides["1"], "2": parts[-1].sides["2"], "3": lateral})
 
 
 @VOLU.form(

@@ -11,13 +11,14 @@ from scipy.spatial import cKDTree
 
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.elements.table import SHAPES, shape
-from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.errors import BadValue, MeshingFailed
 from gibiane_ops.kernels.mesh import (
     arcs,
     chains,
     degenerate,
     distances,
     edges,
+    grids,
     locate,
     orientation,
     project,
@@ -448,3 +449,52 @@ def test_quality_of_equilateral_right_and_flat_elements():
     assert quality.mean_ratio(corner) == pytest.approx([12 * 0.5 ** (2 / 3) / 9])
     assert quality.aspect(corner) == pytest.approx([math.sqrt(2 / 3) * math.sqrt(2) * math.sqrt(3)])
     assert quality.skewness(corner) == pytest.approx([1 - (1 / 6) / (8 * math.sqrt(3) / 27 * (math.sqrt(3) / 2) ** 3)])
+
+
+# ---------------------------------------------------------------- layers between grids
+
+
+@pytest.mark.parametrize(("n", "m"), [(1, 1), (1, 3), (3, 1), (2, 4), (4, 2), (3, 5), (2, 10), (7, 3), (5, 15), (1, 9)])
+def test_quadrangles_between_sides_of_different_numbers_fill_the_square_and_fit(n, m):
+    x, cells = grids.transition(n, m)
+    assert x[: n + 1] == pytest.approx(np.stack([np.linspace(0, 1, n + 1), np.zeros(n + 1)], axis=1))
+    assert x[n + 1 : n + m + 2] == pytest.approx(np.stack([np.linspace(0, 1, m + 1), np.ones(m + 1)], axis=1))
+    sides = np.roll(x[cells], -1, axis=1) - x[cells]
+    before = np.roll(sides, 1, axis=1)
+    corners = before[..., 0] * sides[..., 1] - before[..., 1] * sides[..., 0]
+    assert (corners > 0).all()  # convex
+    one, two = x[cells[:, 2]] - x[cells[:, 0]], x[cells[:, 3]] - x[cells[:, 1]]
+    assert (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2 == pytest.approx(1)
+    edges = np.sort(np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    assert count.max() <= 2
+    assert (count == 1).sum() == n + m + 2
+
+
+def test_an_odd_number_of_sides_has_no_quadrangles():
+    with pytest.raises(BadValue, match="even"):
+        grids.transition(2, 3)
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (0, 4), (3, 0), (3, 4)])
+def test_a_grid_is_found_from_any_corner_whatever_the_order_of_its_quadrangles(corner):
+    ids = np.random.default_rng(1).permutation(20).reshape(4, 5)
+    cells = np.stack([ids[:-1, :-1], ids[:-1, 1:], ids[1:, 1:], ids[1:, :-1]], axis=2).reshape(-1, 4)
+    rng = np.random.default_rng(2)
+    cells = np.array([np.roll(c, rng.integers(4)) for c in rng.permutation(cells)])
+    found = grids.grid_of(cells, int(ids[corner]))
+    ways = [np.rot90(ids, k) for k in range(4)]
+    assert any(found.shape == way.shape and (found == way).all() for way in ways)
+    assert found[0, 0] == ids[corner]
+    with pytest.raises(MeshingFailed, match="no corner"):
+        grids.grid_of(cells, int(ids[1, 1]))
+    for damaged in (cells[1:], np.vstack([cells, cells[:1] + 20])):
+        with pytest.raises(MeshingFailed):
+            grids.grid_of(damaged, int(ids[corner]))
+
+
+def test_interpolation_between_nodes_of_a_grid():
+    y, x = np.meshgrid([0.0, 1.0, 3.0], [0.0, 2.0, 3.0, 7.0], indexing="ij")
+    points = np.stack([x, y, x * 0], axis=2)
+    found = grids.interpolated(points, np.array([0.0, 0.5, 1.0, 1 / 3]), np.array([0.0, 0.5, 1.0, 0.75]))
+    assert found == pytest.approx(np.array([[0, 0, 0], [2.5, 1, 0], [7, 3, 0], [2, 2, 0]]))
