@@ -50,8 +50,8 @@ VOLU = operator(
     "LISTREEL gives their places. Faces 1 (start), 2 (end) and 3 (around) are recorded: see FACE. A "
     "volume in place of S is prolonged from its face 2. `V = S1 VOLU S2 P1 P2 N` joins two grids of QUA4 that may "
     "differ in numbers of rows and columns, if the sum of both numbers is even: P1 is a corner of S1, P2 the corner of "
-    "S2 that faces it; N layers (1) of the same thickness, of which the first takes the change of columns and the last that of "
-    "rows (a single layer is halved when both change). `V = S VOLU e V` puts one layer of elements around "
+    "S2 that faces it; N layers (1) of the same thickness, of which the first takes the change of columns and the last "
+    "that of rows (a single layer is halved when both change). `V = S VOLU e V` puts one layer of elements around "
     "a surface, of thickness e (or a CHPOINT), half on each side along its normals; V tells the outside. "
     "`V = ENV VOLU` alone fills a closed envelope of triangles with tetrahedra.",
     example="OPTI DIME 3 ELEM CUB8 ; S = (DROIT 2 (0. 0. 0.) (1. 0. 0.)) TRAN 2 (0. 1. 0.) ; "

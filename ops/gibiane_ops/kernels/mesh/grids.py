@@ -41,7 +41,8 @@ def grid_of(cells: IntArray, corner: int) -> IntArray:
     while True:
         below, above = [left[0]], [left[1]]
         edge = left
-        while (number := cell_of.pop((edge[1], edge[0]), None)) is not None:
+        while (edge[1], edge[0]) in cell_of:
+            number = cell_of.pop((edge[1], edge[0]))
             turned = cells[number].tolist()
             k = turned.index(edge[0])
             edge = (turned[(k + 1) % 4], turned[(k + 2) % 4])
@@ -52,10 +53,9 @@ def grid_of(cells: IntArray, corner: int) -> IntArray:
             raise MeshingFailed("the quadrangles do not make a grid")
         rows = rows or [below]
         rows.append(above)
-        number = cell_of.get((above[0], above[1]))
-        if number is None:
+        if (above[0], above[1]) not in cell_of:
             break
-        turned = cells[number].tolist()
+        turned = cells[cell_of[above[0], above[1]]].tolist()
         left = above[0], turned[turned.index(above[0]) - 1]
     even = all(len(row) == len(rows[0]) for row in rows)
     if seen != len(cells) or not even or len(np.unique(rows)) != len(rows) * len(rows[0]):
