@@ -54,6 +54,7 @@ GEOMETRY: dict[str, str] = {
     "a size h in every direction is G11 = G22 = G33 = 1/h**2": "une taille h dans toutes les directions est G11 = G22 = G33 = 1/h**2",
     "EPSI '{how}' is not available: strains are linear, or those of Green and Lagrange": "EPSI '{how}' n'est pas disponible : les déformations sont linéaires, ou celles de Green et Lagrange",
     "EPSI 'QUAD' holds for large rotations": "EPSI 'QUAD' vaut pour de grandes rotations",
+    "the field has such values nowhere: the mesh is empty": "le champ n'a nulle part de telles valeurs : le maillage est vide",
     "'{side}' wants one value, not a LISTREEL": "'{side}' veut une valeur, pas un LISTREEL",
     "the field takes that value nowhere: the mesh is empty": "le champ ne prend cette valeur nulle part : le maillage est vide",
     "points have no inside: lines, surfaces or volumes are wanted": "des points n'ont pas d'intérieur : il faut des lignes, des surfaces ou des volumes",
