@@ -110,18 +110,15 @@ def test_impossible_wishes_are_refused(bad):
 
 def adapted(count, stretch):
     points, cells = grid(16, 2)
-    for _ in range(3):
-        blocks = [("TRI3", cells)]
-        H = metric.hessians(points, blocks, layer(points))
-        M = metric.metric_map(points, blocks, H, count, smallest=0.002, stretch=stretch)
-        new = remesh(points, cells, M)
-        points, cells = new.points, new.cells
-    return points, cells
+    blocks = [("TRI3", cells)]
+    H = metric.hessians(points, blocks, layer(points))
+    new = remesh(points, cells, metric.metric_map(points, blocks, H, count, smallest=0.002, stretch=stretch))
+    return new.points, new.cells
 
 
 def test_a_layer_costs_less_with_long_elements_in_the_plane():
-    long_points, long_cells = adapted(800, 50.0)
-    points, cells = adapted(800, 1.0)
+    long_points, long_cells = adapted(300, 50.0)
+    points, cells = adapted(300, 1.0)
     assert abs(len(long_points) / len(points) - 1) < 0.2
     assert measures(shape("TRI3"), long_points[long_cells]).sum() == pytest.approx(1.0)
-    assert interpolation_error(long_points, long_cells) < 0.35 * interpolation_error(points, cells)
+    assert interpolation_error(long_points, long_cells) < 0.1 * interpolation_error(points, cells)
