@@ -27,6 +27,7 @@ LEVELS: dict[str, int] = {
     "G417": WARNING,
     "G418": NOTE,
     "G419": WARNING,
+    "G420": WARNING,
     "G900": FATAL,
 }
 G_CODES = {
@@ -55,6 +56,7 @@ G_CODES = {
     "G417": "slips beyond the facets of the start",
     "G418": "contact stopped early because the user asked for it",
     "G419": "flat elements in a new mesh",
+    "G420": "elements of different degrees that nothing ties",
     "G501": "file cut or of unknown format",
     "G601": "workers of a study are lost",
     "G602": "no cluster answers",

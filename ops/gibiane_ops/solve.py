@@ -12,6 +12,7 @@ from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTCHPO, RIGIDITE, TABLE, Table
 from gibiane_ops.values.champs import DISCRET, ChPoint
 from gibiane_ops.values.conditions import family
+from gibiane_ops.values.conforming import warn_torn
 from gibiane_ops.values.contact_solution import Wishes, solve_contact
 from gibiane_ops.values.linear import solve_linear
 from gibiane_ops.values.methods import PLAIN, STATUSES, WITH_R, Method
@@ -167,6 +168,7 @@ def _solutions(
     ctx: Context, k: Rigidite, fields: Sequence[ChPoint], prec: float | None, lenient: bool, wishes: Wishes
 ) -> list[ChPoint]:
     """Solve for every second member."""
+    warn_torn(ctx, k)
     system = build(ctx, k, bilateral=wishes.bonded)
     loads = [system.load(ctx, field, lenient=lenient) for field in fields]
     if not system.symmetric:

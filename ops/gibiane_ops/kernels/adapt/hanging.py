@@ -16,6 +16,27 @@ TOLERANCE = 1e-9
 """Distance of a hanging node to the middle of its edge or face, as a share of the edge."""
 
 
+def middles_on_linear(blocks: Sequence[Block]) -> IntArray:
+    """Find the mid-nodes of quadratic elements whose edge is also that of a linear element.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    (k, 3) int64
+        The two ends, then the mid-node, by increasing mid-node.
+    """
+    quadratic = topology.middles(blocks)
+    ends = topology.edges([(name, cells) for name, cells in blocks if shape(name).degree == 1])
+    if not len(quadratic) or not len(ends):
+        return quadratic[:0]
+    n = np.int64(max(quadratic.max(), ends.max()) + 1)
+    pair = np.sort(quadratic[:, :2], axis=1)
+    return quadratic[_among(pair[:, 0] * n + pair[:, 1], np.sort(ends[:, 0] * n + ends[:, 1]))]
+
+
 def hanging_nodes(points: FloatArray, blocks: Sequence[Block]) -> tuple[IntArray, IntArray]:
     """Find the nodes that stand in the middle of an edge or of a face of a larger or linear element.
 
@@ -38,17 +59,10 @@ def hanging_nodes(points: FloatArray, blocks: Sequence[Block]) -> tuple[IntArray
     edges lead from it to nodes in the middles of the four sides. A mid-node of a quadratic element hangs where its
     edge is also that of a linear element.
     """
-    n = np.int64(len(points))
     linear = [(name, cells) for name, cells in blocks if shape(name).degree == 1]
     ends = topology.edges(linear)
-    quadratic = topology.middles(blocks)
-    known = np.sort(ends[:, 0] * n + ends[:, 1])
-    found_nodes, found_masters = [np.zeros(0, np.int64)], [np.zeros((0, 4), np.int64)]
-    if len(quadratic):
-        pair = np.sort(quadratic[:, :2], axis=1)
-        on = _among(pair[:, 0] * n + pair[:, 1], known)
-        found_nodes.append(quadratic[on, 2])
-        found_masters.append(_padded(quadratic[on, :2]))
+    beside = middles_on_linear(blocks)
+    found_nodes, found_masters = [beside[:, 2]], [_padded(beside[:, :2])]
     edge_of, middle = halved_edges(points, ends)
     found_nodes.append(middle)
     found_masters.append(_padded(ends[edge_of]))
