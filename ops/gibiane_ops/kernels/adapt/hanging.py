@@ -34,7 +34,7 @@ def middles_on_linear(blocks: Sequence[Block]) -> IntArray:
         return quadratic[:0]
     n = np.int64(max(quadratic.max(), ends.max()) + 1)
     pair = np.sort(quadratic[:, :2], axis=1)
-    return quadratic[_among(pair[:, 0] * n + pair[:, 1], np.sort(ends[:, 0] * n + ends[:, 1]))]
+    return np.asarray(quadratic[_among(pair[:, 0] * n + pair[:, 1], np.sort(ends[:, 0] * n + ends[:, 1]))], np.int64)
 
 
 def hanging_nodes(points: FloatArray, blocks: Sequence[Block]) -> tuple[IntArray, IntArray]:
