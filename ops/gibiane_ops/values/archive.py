@@ -208,8 +208,12 @@ class Archive:
             raise BadArchive(f"its content is damaged ({type(failure).__name__})") from failure
 
     def digest(self) -> bytes:
-        """Return bytes that are the same for the same content, whenever it was written."""
-        found = hashlib.sha256(json.dumps(self._content, sort_keys=True).encode())
+        """Return bytes that are the same for the same content, whenever it was written.
+
+        How many nodes the session had before is no content.
+        """
+        content = {name: value for name, value in self._content.items() if name != "first"}
+        found = hashlib.sha256(json.dumps(content, sort_keys=True).encode())
         for array in self._arrays:
             found.update(f"{array.dtype}{array.shape}".encode())
             found.update(np.ascontiguousarray(array).tobytes())
