@@ -61,7 +61,7 @@ RESO = operator(
     "largest number of iterations; 'ARRE' e, e the error of the mesh in energy norm "
     "(absolute, the third result of ERRE or 'ABSOLUE' of its TABLE), "
     "stops the corrections of a small model when SOLVEUR is below a tenth of it (CONVERGE is FAUX then, without "
-    "failure; MESSAGE or a note says it): 5 iterations for 7 or 8, a fifth of their time, measured on a cube on a "
+    "failure; MESSAGE or a note says it): 5 iterations for 7 or 8, measured on a cube on a "
     "block of 2540 nodes; on a condensed interface, where an iteration costs a thousandth of the "
     "preparation, nothing would be saved and nothing changes; "
     "a result that breaks the exact laws by more than 1.E-5 (a hundred times TOLE if "

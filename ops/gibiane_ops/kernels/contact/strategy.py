@@ -104,7 +104,7 @@ def plan(
     -----
     A factor takes about n^2 operations in space and each of its solutions n^(4/3), multigrid a time in proportion to
     the entries. The constants were measured on two blocks of trilinear cubes, alone on two cores: see ``SECONDS``.
-    They are meant to tell seconds from minutes; a busy machine takes two to four times as long.
+    They are meant to tell seconds from minutes; a busy machine takes twice as long or more.
     """
     small = n <= SMALL or components <= FEW or dim == 2
     exact = all_exact or not coordinates or (small and not krylov)

@@ -137,9 +137,9 @@ def tied_solver(
         diagonal = np.zeros(size)
         diagonal[missing] = A.diagonal().mean()
         whole = sp.csr_array(whole + sp.diags_array(diagonal))
+    blocks = whole.tobsr(blocksize=(d, d))
+    del rows, whole  # of a million unknowns, two Gbyte that multigrid wants
     modes = rigid_modes(points[nodes], points[nodes].mean(axis=0))
     modes[missing] = 0.0
-    factor = factorize(
-        whole.tobsr(blocksize=(d, d)), method=method, near_null=modes, block=d, tolerance=PASS, reserve=False
-    )
+    factor = factorize(blocks, method=method, near_null=modes, block=d, tolerance=PASS, reserve=False)
     return TiedSolver(A, factor, place)
