@@ -43,7 +43,7 @@ OPERATORS: dict[str, tuple[str, ...]] = {
     "REGENERER": ("gibiane_ops.mesh.conversion",),
     "ARETE": ("gibiane_ops.mesh.conversion",),
     "MANUEL": ("gibiane_ops.mesh.manual", "gibiane_ops.fields.making", "gibiane_ops.matrices"),
-    "SURFACE": ("gibiane_ops.mesh.curved",),
+    "SURFACE": ("gibiane_ops.mesh.curved", "gibiane_ops.mesh.polynomial"),
     "MAILLER": ("gibiane_ops.mesh.filling", "gibiane_ops.mesh.primitives"),
     "REMAILLER": ("gibiane_ops.mesh.remeshing",),
     "FACE": ("gibiane_ops.mesh.volumes",),

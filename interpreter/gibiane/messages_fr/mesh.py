@@ -47,6 +47,7 @@ MESH = {
     "change one of them by one": "changer l'un d'eux d'une unité",
     "a number of layers is above 0: {value} cannot be one": "un nombre de couches dépasse 0 : {value} ne peut en être un",
     "a grid of QUA4 or QUA8 is wanted, this mesh holds {shapes}": "il faut une grille de QUA4 ou QUA8, ce maillage contient {shapes}",
+    "{first} by {second} coefficients are {wanted} points; {count} are given": "{first} par {second} coefficients font {wanted} points ; {count} sont donnés",
     # selection
     "no element of the mesh is like that": "aucun élément du maillage n'est ainsi",
     "the two points are one: nothing is between them": "les deux points n'en font qu'un : rien n'est entre eux",

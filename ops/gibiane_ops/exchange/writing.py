@@ -22,7 +22,7 @@ from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.nodes import IntArray, node_store
 
-WORDS = tuple(word for word in FORMATS if word != "VTK")
+WORDS = tuple(word for word in FORMATS if word not in ("VTK", "FEM"))
 
 
 @extend("SORTIR").stream(

@@ -203,7 +203,8 @@ LIRE = operator(
     "LIRE",
     topic="files",
     summary="read a file: a table of numbers, meshes, procedures",
-    notice="'MED' (needs h5py), 'UNV', 'GMSH', 'ABAQ' (Abaqus), 'NAS' (Nastran), 'AVS', 'VTK' (.vtu .vtk): a TABLE "
+    notice="'MED' (needs h5py), 'UNV', 'GMSH', 'ABAQ' (Abaqus), 'NAS' (Nastran), 'FEM' (OptiStruct, by "
+    "HyperMesh: components and sets), 'AVS', 'VTK' (.vtu .vtk): a TABLE "
     "whose indices are the names of the groups of elements and nodes, and of the fields; 'MAILLAGE' is the whole mesh. "
     "Groups that have only a number are REF1, REF2 ... 'STL': a MAILLAGE of triangles. "
     "'CSV': a TABLE of LISTREEL, one per column ('COLO', the usual) or per line ('LIGN'). 'SEPA' is "

@@ -26,7 +26,10 @@ SURF = operator(
     "(centre, point of the axis, centre of a small circle) fill lines on a sphere, a cylinder, a cone or a torus; two "
     "lines that go round the axis bound the part between them. The segments of the lines are kept as they are; inside, "
     "the elements follow their lengths, or the CHPOINT or FLOTTANT given before the word. Elements turn as the outer "
-    "line does. A FLOTTANT after 'PLAN' (tolerance of flatness) is accepted.",
+    "line does. A FLOTTANT after 'PLAN' (tolerance of flatness) is accepted. `S = SURF 'POLYNOME' N1 N2 P1 P2 ... "
+    "('PARAMETRE' U1 U2 V1 V2) ('REGULIER')`: the surface sum P U**i V**j, the N1 points of V**0 first, then those of "
+    "V**1 ... for U and V from 0 to 1 or between the bounds; the density says how many elements; their nodes are "
+    "equally spaced in U and V, or with 'REGULIER' along the four sides.",
     example="OPTI DIME 2 ELEM TRI3 ; C = CERC 24 'ROTA' 360. (1. 0.) (0. 0.) 'ELIM' ; "
     "S = SURF C 'PLAN' ; MESS ((MESU S) > 3.) ;",
     see=["DALLER", "MAILLER", "CONTOUR"],

@@ -21,6 +21,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import SHAPES, shape
 from gibiane_ops.kernels.errors import BadValue, MissingPackage, UnreadableFile
 from gibiane_ops.kernels.exchange.meshfile import MeshFile, numbered_groups
+from gibiane_ops.kernels.exchange.optistruct import read_fem
 from gibiane_ops.kernels.exchange.unv import WRITTEN, read_unv, write_unv
 from gibiane_ops.kernels.topology import group_by_nodes
 
@@ -54,6 +55,7 @@ FORMATS = {
     "MED": Format("MED", ".med", "med", "med", "cell_tags"),
     "UNV": Format("UNV", ".unv", "", ""),
     "NAS": Format("Nastran", ".bdf", "nastran", "nastran", "nastran:ref"),
+    "FEM": Format("OptiStruct", ".fem", "", ""),
     "ABAQ": Format("Abaqus", ".inp", "abaqus", "abaqus"),
     "AVS": Format("AVS", ".avs", "avsucd", "avsucd", "avsucd:material"),
     "STL": Format("STL", ".stl", "stl", "stl", "", False),
@@ -89,7 +91,8 @@ def read_mesh(path: Path, word: str) -> MeshFile:
     of = FORMATS[word]
     if not of.reader:
         text = path.read_bytes().decode("latin-1")
-        return read_unv(path.as_posix(), text).checked(path.as_posix())
+        found = read_fem(path.as_posix(), text, _SHAPE) if word == "FEM" else read_unv(path.as_posix(), text)
+        return found.checked(path.as_posix())
     _need_h5py(word)
     meshio = _meshio()
     reader = BY_EXTENSION.get(path.suffix.lower(), of.reader) if word == "VTK" else of.reader

@@ -74,6 +74,10 @@ class Curve:
 
     def by_length(self, places: FloatArray) -> FloatArray:
         """Return points at parts of the length, (k,) from 0 to 1, as (k, 3)."""
+        return self.at(self.parameters(places))
+
+    def parameters(self, places: FloatArray) -> FloatArray:
+        """Return the values of the parameter at parts of the length, (k,) from 0 to 1."""
         wanted = places * self._lengths[-1]
         u = np.interp(places, self._lengths / self._lengths[-1], self._ends)
         low, high = min(self.start, self.end), max(self.start, self.end)
@@ -81,7 +85,7 @@ class Curve:
             speed = self._speed(u)
             step = np.divide(wanted - self._length_to(u), speed, out=np.zeros_like(u), where=speed > 0)
             u = np.clip(u + step, low, high)
-        return self.at(u)
+        return np.asarray(u, np.float64)
 
 
 def parabola(a: FloatArray, tip: FloatArray, b: FloatArray) -> Curve:
