@@ -344,6 +344,8 @@ def _term(ctx: Context, q: Operands, sign: float) -> _Term:
         if length == 0:
             ctx.fail(239, "the direction is null", at="name")
         weights = factor * vector[: len(names)] / length
+    elif word == "DUAL":
+        ctx.fail(37, "'DUAL' wants a second field behind it", at="name", hint="RELA CHPO 'DUAL' CHPO2")
     elif word not in KNOWN:
         known = " ".join(displacements(ctx))
         hint = "here the unknowns are {known}; 'DEPL' 'DIRECTION' V takes them along a vector"

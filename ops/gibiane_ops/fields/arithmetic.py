@@ -27,6 +27,16 @@ UFUNCS: dict[str, Callable[[FloatArray, Any], FloatArray]] = {
 }
 
 
+def _in_range(ctx: Context, compute: Callable[[], Field], *operands: Field | Number) -> Field:
+    """Compute a field; fail where a value is too large though the operands are finite."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = compute()
+    bad = int((~np.isfinite(values_of(found))).sum())
+    if bad and all(np.isfinite(x if isinstance(x, Number) else values_of(x)).all() for x in operands):
+        ctx.fail(26, "{count} values of the result are too large for a FLOTTANT", at="b", count=bad)
+    return found
+
+
 def _two_fields(ctx: Context, symbol: str, a: Field, b: Field, names: list[Any]) -> Field:
     if symbol == "/" and not len(values_of(b)):
         ctx.fail(26, "the divisor is an empty field", at="b")
@@ -80,10 +90,10 @@ def _arithmetic(symbol: str) -> None:
     )
 
     def of_fields(ctx: Context, a: Field, b: Field) -> Field:
-        return _two_fields(ctx, symbol, a, b, [])
+        return _in_range(ctx, lambda: _two_fields(ctx, symbol, a, b, []), a, b)
 
     def by_components(ctx: Context, a: Field, b: Field, names: list[Any]) -> Field:
-        return _two_fields(ctx, symbol, a, b, names)
+        return _in_range(ctx, lambda: _two_fields(ctx, symbol, a, b, names), a, b)
 
     for kind in (CHPOINT, MCHAML):
         declare = op.form(Arg("a", kind, "field"), Arg("b", kind, "field"), *names, gives=[kind])
@@ -91,7 +101,7 @@ def _arithmetic(symbol: str) -> None:
 
     @op.form(Arg("a", OPERAND, "field or number"), Arg("b", OPERAND, "field or number"), gives=["CHPOINT|MCHAML"])
     def _with_number(ctx: Context, a: Field | Number, b: Field | Number) -> Field:
-        return _field_and_number(ctx, symbol, a, b)
+        return _in_range(ctx, lambda: _field_and_number(ctx, symbol, a, b), a, b)
 
 
 for _symbol in UFUNCS:
@@ -104,10 +114,10 @@ for _symbol in UFUNCS:
 def _power(ctx: Context, a: Field | Number, b: Field | Number) -> Field:
     if isinstance(a, ChPoint | MChaml) and isinstance(b, int | float):
         _check_power(ctx, values_of(a), b)
-        return mapped(a, lambda v: real_power(v, b))
+        return _in_range(ctx, lambda: mapped(a, lambda v: real_power(v, b)), a, b)
     if isinstance(b, ChPoint | MChaml) and isinstance(a, int | float):
         _check_power(ctx, a, values_of(b))
-        return mapped(b, lambda v: real_power(a, v))
+        return _in_range(ctx, lambda: mapped(b, lambda v: real_power(a, v)), a, b)
     ctx.fail(21, "a field and a number are wanted", at="b")
 
 

@@ -93,9 +93,12 @@ def exact(c):
 
 def in_order(points, upper, u, xyz, top):
     """Return u in the order of the nodes (xyz, top)."""
-    key = lambda x, b: [tuple(r) for r in np.c_[np.round(x * 1e3).astype(int), b.astype(int)].tolist()]  # noqa: E731
-    number = {k: i for i, k in enumerate(key(points, upper))}
-    return u[[number[k] for k in key(xyz, top)]]
+
+    def keys(x, above):
+        return [tuple(row) for row in np.c_[np.round(x * 1e3).astype(int), above.astype(int)].tolist()]
+
+    number = {key: i for i, key in enumerate(keys(points, upper))}
+    return u[[number[key] for key in keys(xyz, top)]]
 
 
 def measure(c, code, command, folder):
