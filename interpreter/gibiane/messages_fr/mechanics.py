@@ -1,6 +1,7 @@
 """Sentences about fields, models, loads, solutions, contact, estimation and adaptation."""
 
 MECHANICS = {
+    "RELA CHPO 'DUAL' CHPO2": "RELA CHPO 'DUAL' CHPO2",
     "'DUAL' wants a second field behind it": "'DUAL' veut un second champ derrière lui",
     # fields
     "three LISTMOTS of one length are wanted: components of the first field, of the second, of the result": "il faut trois LISTMOTS de même longueur : composantes du premier champ, du second, du résultat",
