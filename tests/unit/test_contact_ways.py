@@ -145,3 +145,18 @@ def test_krylov_equals_newton(session):
         np.testing.assert_allclose(found[name], values, atol=1e-8 * np.abs(values).max())
     assert other.get("METHODE") == "KRYL"
     assert list(other.get("STATUTS").values) == list(table.get("STATUTS").values)
+
+
+def test_a_method_that_needs_the_exact_stiffness_takes_a_factor_though_multigrid_was_kept(
+    session, corrected, monkeypatch
+):
+    monkeypatch.setattr("gibiane_ops.kernels.choice.SMALL", 0)
+    monkeypatch.setattr("gibiane_ops.kernels.choice.EACH", 100)
+    solve(session)
+    assert not contact_of(session).tied.direct
+    assert session.run_text(SOLVE.format("'PENA' 1.E4")) == 0
+    assert contact_of(session).tied.direct
+    # and back: the exact stiffness that is there serves
+    kept = contact_of(session)
+    assert session.run_text(SOLVE.format("")) == 0
+    assert contact_of(session) is kept

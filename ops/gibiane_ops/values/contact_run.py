@@ -36,21 +36,15 @@ class Prepared:
 
 def way_of(ctx: Context, system: System, pairs: ContactPairs, reduction: Reduction, exact: bool, krylov: bool) -> Plan:
     """Choose the way and, with ECHO, say it in one line."""
-    dim = system.dim
-    elastic = system.names in ELASTIC and not len(system.stop_signs)
-    if krylov and not elastic:
+    if krylov and not _iterates(system):
         ctx.fail(
             21,
             "'KRYL' needs elastic solids and conditions without MINI or MAXI",
             at="k",
             hint="the default method 'NEWT' treats them",
         )
-    n = len(reduction.free) - len(pairs.pairs) * dim * bool((pairs.pairs >= 0).all())
-    components = (len(pairs.pairs) + len(system.stop_signs)) * dim
-    chosen = plan(
-        n, system.K.nnz, components, dim,
-        wish=solver_wish(ctx), coordinates=elastic, all_exact=exact, krylov=krylov,
-    )  # fmt: skip
+    n, _ = _sizes(system, pairs, reduction)
+    chosen = _plan(ctx, system, pairs, reduction, exact, krylov)
     if ctx.option("ECHO") >= 1:
         how = "condensed on" if chosen.exact else "corrected on a small model of"
         solver = METHODS.get(chosen.method, "a factor")
@@ -60,6 +54,44 @@ def way_of(ctx: Context, system: System, pairs: ContactPairs, reduction: Reducti
             f"about {chosen.memory / 1e9:.2g} Gbyte{duration}"
         )
     return chosen
+
+
+def serves(
+    ctx: Context,
+    system: System,
+    pairs: ContactPairs,
+    reduction: Reduction,
+    exact: bool,
+    krylov: bool,
+    found: Prepared,
+) -> bool:
+    """Tell whether bodies prepared for another method serve one that may need the exact stiffness.
+
+    Prepared for a few solutions by multigrid, they would take one for each component of the pairs where a factor is
+    the faster way.
+    """
+    if not exact or found.bodies.is_exact or found.bodies.tied.direct:
+        return True
+    return _plan(ctx, system, pairs, reduction, exact, krylov).method == found.way.method
+
+
+def _plan(ctx: Context, system: System, pairs: ContactPairs, reduction: Reduction, exact: bool, krylov: bool) -> Plan:
+    n, components = _sizes(system, pairs, reduction)
+    return plan(
+        n, system.K.nnz, components, system.dim,
+        wish=solver_wish(ctx), coordinates=_iterates(system), all_exact=exact, krylov=krylov,
+    )  # fmt: skip
+
+
+def _iterates(system: System) -> bool:
+    """Tell whether the small model can be built."""
+    return system.names in ELASTIC and not len(system.stop_signs)
+
+
+def _sizes(system: System, pairs: ContactPairs, reduction: Reduction) -> tuple[int, int]:
+    """Count the tied unknowns and the components of the relative displacements."""
+    n = len(reduction.free) - len(pairs.pairs) * system.dim * bool((pairs.pairs >= 0).all())
+    return n, (len(pairs.pairs) + len(system.stop_signs)) * system.dim
 
 
 def run_on_bodies(

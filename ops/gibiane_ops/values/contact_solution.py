@@ -22,7 +22,7 @@ from gibiane_ops.kernels.contact.uniqueness import compare_starts
 from gibiane_ops.values.champs import ChPoint
 from gibiane_ops.values.contact_checks import check_normals, held_rows, overlapping, refuse_held, warn_far
 from gibiane_ops.values.contact_condition import condition
-from gibiane_ops.values.contact_run import Prepared, run_on_bodies, way_of
+from gibiane_ops.values.contact_run import Prepared, run_on_bodies, serves, way_of
 from gibiane_ops.values.contact_start import force_nodes, slip_origin_of, start_of
 from gibiane_ops.values.contact_words import counted, departures, fail_contact, listed, reason_of, stopped, success
 from gibiane_ops.values.failures import worded
@@ -129,7 +129,12 @@ def solve_contact(
     with worded(ctx, at="k"):
         geometry = (pairs.pairs, pairs.normals, pairs.row, pairs.node, pairs.coefficient)
         key = solver_wish(ctx), wishes.method.krylov, *(each.tobytes() for each in geometry)
-        prepared: Prepared = kept(ctx, "contact", k, key, prepare)
+        krylov = wishes.method.krylov
+
+        def suits(found: Prepared) -> bool:
+            return serves(ctx, system, pairs, reduction, exact, krylov, found)
+
+        prepared: Prepared = kept(ctx, "contact", k, key, prepare, suits)
         bodies = prepared.bodies
         tied = bodies.load(F, reduction.offset)
         gap = bodies.gaps(tied, system.stop_values(field), pairs.gap)

@@ -23,17 +23,25 @@ SPARE = 2e9
 """Free memory, bytes, below which only one result is kept at all."""
 
 
-def kept(ctx: Context, kind: str, k: Rigidite, extra: Hashable, make: Callable[[], Any]) -> Any:
+def kept(
+    ctx: Context,
+    kind: str,
+    k: Rigidite,
+    extra: Hashable,
+    make: Callable[[], Any],
+    serves: Callable[[Any], bool] = lambda found: True,
+) -> Any:
     """Return what `make` computes for the matrices and conditions of `k` and for `extra`, or what it gave last time.
 
     Matrices made anew are recognised by their entries. One result of each kind is kept, and only for the last
-    matrices: a factor of a large model fills most of the memory.
+    matrices: a factor of a large model fills most of the memory. One that `serves` refuses is made anew.
     """
     cache: dict[str, Any] = ctx.state.setdefault("factors", {})
     version, parts = node_store(ctx).version, [*k.matrices, *k.conditions]
     found = cache.get(kind)
     if found is not None and found[0] == version and found[1] == extra and _same_parts(found[2], parts):
-        return found[3]
+        if serves(found[3]):
+            return found[3]
     del found
     cache.pop(kind, None)
     for other in [name for name, entry in cache.items() if not _shared(entry[2], parts)]:
