@@ -39,9 +39,9 @@ def kept(
     cache: dict[str, Any] = ctx.state.setdefault("factors", {})
     version, parts = node_store(ctx).version, [*k.matrices, *k.conditions]
     found = cache.get(kind)
-    if found is not None and found[0] == version and found[1] == extra and _same_parts(found[2], parts):
-        if serves(found[3]):
-            return found[3]
+    same = found is not None and found[0] == version and found[1] == extra and _same_parts(found[2], parts)
+    if found is not None and same and serves(found[3]):
+        return found[3]
     del found
     cache.pop(kind, None)
     for other in [name for name, entry in cache.items() if not _shared(entry[2], parts)]:
