@@ -17,7 +17,7 @@ usage: gibiane FILE [NAME=VALUE ...]    run a script (- reads it from standard i
        gibiane -c TEXT                  run a text
        gibiane -i FILE [NAME=VALUE ...] run a script and stay at the prompt
        gibiane check FILE...            parse only: report syntax errors
-       gibiane info NAME                describe an operator
+       gibiane info NAME                describe an operator, a procedure or a code (G405)
        gibiane test DIR [--bless]       run golden scripts: x.dgibi against x.out
        gibiane docs [--check] [FILE]    write OPERATORS.md, or say whether it is stale
 options: --echo N  --lang fr|en  --workers N  --dask tcp://HOST:PORT (who runs ASSI 'TOUS')

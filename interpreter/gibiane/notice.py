@@ -6,7 +6,7 @@ import textwrap
 from typing import Any
 
 from gibiane import cast3m, registry
-from gibiane.diagnostics import nearest
+from gibiane.diagnostics import G_CODES, nearest
 from gibiane.registry import Context, Operator
 
 WIDTH = 100
@@ -46,13 +46,15 @@ def header(word: str, text: str) -> str:
 
 
 def notice(ctx: Context, word: str, node: Any) -> str:
-    """Return the notice that INFO prints for a word: an operator, else a procedure in a file."""
+    """Return the notice that INFO prints for a word: an operator, a procedure in a file or the code of a message."""
     op = registry.find(word)
     if op is not None:
         return describe(op)
     source = ctx.session.library.find(word) if word.isidentifier() else None
     if source is not None:
         return header(word, source.text)
+    if word.upper() in G_CODES:
+        return f"{word.upper()}: {G_CODES[word.upper()]}"
     ctx.places["word"] = node
     missing = cast3m.meant(word)
     if missing is not None:

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NoReturn
 
 from gibiane.binding import Mismatch, Operands, bind, explain
@@ -224,6 +225,11 @@ class Context:
     def fail(self, code: int | str, template: str, **options: Any) -> NoReturn:
         """Raise an error; options as for :meth:`diagnostic`."""
         raise GibianeError(self.diagnostic(code, template, **options))
+
+    def cannot_write(self, path: Path, failure: OSError) -> NoReturn:
+        """Refuse a file that the system does not let be written (error 1130)."""
+        reason = (failure.strerror or "unknown reason").lower()
+        self.fail(1130, "the file {path} cannot be written ({reason})", path=path.as_posix(), reason=reason)
 
     def warn(self, code: int | str, template: str, *, level: int = 1, **options: Any) -> None:
         """Emit a warning (level 1) or a note (level 0)."""

@@ -20,7 +20,7 @@ from gibiane.syntax import parse, refuse_long
 from gibiane.values import PREDEFINED, Value, type_of
 
 EXIT_CODES = {0: 0, 1: 4, 2: 8, 3: 12}
-INTERNAL_FAILURE, INTERRUPTED = 70, 130
+INTERNAL_FAILURE = 70
 KEYBOARD = 5  # the unit that OPTI DONN 5 reads
 MAX_INCLUDED = 50
 # 500 nested calls of procedures take a dozen Python calls each

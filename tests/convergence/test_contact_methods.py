@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from interfaces import bare_interface
 from two_blocks import blocks, load_push
 
 from gibiane_ops.kernels.contact.augmented import solve_augmented_newton, solve_uzawa
 from gibiane_ops.kernels.contact.bipotential import solve_bipotential
 from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring_condition
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
-from gibiane_ops.kernels.contact.interface import bare_interface
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.multipliers import solve_multipliers
 from gibiane_ops.kernels.contact.newton import solve_coulomb

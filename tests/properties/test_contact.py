@@ -3,10 +3,10 @@
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from interfaces import bare_interface
 
 from gibiane_ops.kernels.contact.cone import friction_bound, norms, orthogonal_projection, radial_projection
 from gibiane_ops.kernels.contact.frames import local_frames
-from gibiane_ops.kernels.contact.interface import bare_interface
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 
 SEEDS = st.integers(0, 2**32 - 1)

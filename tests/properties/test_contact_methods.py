@@ -1,11 +1,14 @@
 """A contact method returns a solution of its law or says that it has none; it never depends on units."""
 
+import itertools
+
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from interfaces import bare_interface
 
-from gibiane_ops.kernels.contact.interface import Interface, bare_interface
+from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction, friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.outcome import accepted
@@ -150,3 +153,51 @@ def test_units_change_nothing(method, seed, force, length, mu):
         np.testing.assert_array_equal(one.status, other.status)
         np.testing.assert_allclose(other.r, F * one.r, atol=1e-9 * F * a.force_scale)
         np.testing.assert_allclose(other.w, L * one.w, atol=1e-9 * L * a.length_scale)
+
+
+def states_in_the_plane(interface: Interface, law: Friction) -> list[tuple[int, ...]]:
+    """List every set of statuses that obeys the law, by solving for each: open, stick, and slip either way."""
+    n, found = interface.n_pairs, []
+    for statuses in itertools.product(range(4), repeat=n):
+        # unknowns: relative displacements, then forces; two rows a pair besides the equilibrium
+        A, b = np.zeros((4 * n, 4 * n)), np.zeros(4 * n)
+        A[: 2 * n] = np.hstack([interface.S, -np.eye(2 * n)])
+        b[: 2 * n] = interface.f
+        for i, status in enumerate(statuses):
+            row, w, r = 2 * n + 2 * i, 2 * i, 2 * n + 2 * i
+            if status == 0:
+                A[row, r] = A[row + 1, r + 1] = 1
+                continue
+            A[row, w], b[row] = 1, interface.gap[i]
+            if status == 1:
+                A[row + 1, w + 1] = 1
+            else:
+                way = 1 if status == 2 else -1
+                A[row + 1, r + 1], A[row + 1, r], b[row + 1] = 1, way * law.mu[i], way * law.cohesion[i]
+        w, r = np.linalg.solve(A, b).reshape(2, n, 2)
+        is_open, slips = np.array(statuses) == 0, np.array(statuses) > 1
+        way = np.where(np.array(statuses) == 2, 1, -1)
+        bound = law.cohesion - law.mu * r[:, 0]
+        obeys = np.where(is_open, w[:, 0] <= interface.gap + 1e-9, r[:, 0] <= 1e-9)
+        obeys &= is_open | np.where(slips, way * w[:, 1] <= 1e-9, np.abs(r[:, 1]) <= bound + 1e-9)
+        if obeys.all():
+            found.append(statuses)
+    return found
+
+
+@settings(deadline=None, max_examples=25)
+@given(SEEDS, st.integers(1, 3), st.sampled_from([0.0, 0.2, 0.5]), st.booleans())
+@example(24, 1, 0.0, True)
+@example(99, 3, 0.0, True)
+def test_a_state_with_cohesion_is_found_where_there_is_one(seed, n, mu, gap):
+    """A pair that opens loses its cohesion at once, so that there may be none: then no method returns one."""
+    interface = random_interface(seed, n, 2, gap=gap, loose=False)
+    law = friction(n, mu=mu, cohesion=np.random.default_rng(seed).uniform(0, 0.8, n))
+    exists = bool(states_in_the_plane(interface, law))
+    for method in (Method("NEWT"), Method("TRES"), Method("PROJ", max_iter=300)):
+        try:
+            method.solve(interface, law)
+        except FAILURES:
+            assert not exists or method.name != "NEWT"
+        else:
+            assert exists

@@ -325,10 +325,11 @@ def _titre(ctx: Context, q: Operands) -> None:
 INFO = operator(
     "INFO",
     topic="language",
-    summary="describe an operator or a procedure",
+    summary="describe an operator, a procedure or the code of a message",
     terminal=True,
     notice="Prints the forms, operands, keywords and an example of an operator, or the comment at the head of a "
-    "procedure file: of the script's folder, of the current one, or shipped (INFO ADAPTER ;).",
+    "procedure file: of the script's folder, of the current one, or shipped (INFO ADAPTER ;), or what the code of a "
+    "message means (INFO G405 ;).",
     example="INFO MESS ;",
 )
 

@@ -325,12 +325,7 @@ def write_text(ctx: Context, path: Path, text: str) -> None:
         with path.open("a" if key in opened else "w", encoding="utf-8") as stream:
             stream.write(text)
     except OSError as failure:
-        ctx.fail(
-            1130,
-            "the file {path} cannot be written ({reason})",
-            path=path.as_posix(),
-            reason=(failure.strerror or "unknown reason").lower(),
-        )
+        ctx.cannot_write(path, failure)
     opened.add(key)
 
 

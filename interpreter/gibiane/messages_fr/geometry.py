@@ -21,7 +21,6 @@ GEOMETRY: dict[str, str] = {
     "{text} is the point of coordinates {x} and {y}: a comma is a blank": "{text} est le point de coordonnées {x} et {y} : une virgule est un blanc",
     "a real is written with a dot: {x}.{y}": "un réel s'écrit avec un point : {x}.{y}",
     "coordinates are 1 to {dim}, and {after} is the density": "les coordonnées vont de 1 à {dim}, et {after} est la densité",
-    "CHAN 'COMP' (MOTS 'old') (MOTS 'new') FIELD renames some of them": "CHAN 'COMP' (MOTS 'ancien') (MOTS 'nouveau') CHAMP en renomme certaines",
     "a matrix of a field is diagonal: 'DIAG' is missing": "une matrice tirée d'un champ est diagonale : il manque 'DIAG'",
     "there are not as many names of forces as of unknowns": "il n'y a pas autant de noms de forces que d'inconnues",
     "elements of one type are wanted, this mesh holds {known}": "il faut des éléments d'un seul type, ce maillage contient {known}",

@@ -16,7 +16,7 @@ MECHANICS = {
     "unknown nature '{nature}'; accepted: INDETERMINE, DIFFUS, DISCRET": "nature inconnue '{nature}' ; acceptées : INDETERMINE, DIFFUS, DISCRET",
     "{old} components and {new} new names": "{old} composantes et {new} nouveaux noms",
     "the field has {count} components ({known}): which is to be renamed?": "le champ a {count} composantes ({known}) : laquelle renommer ?",
-    "NOMC (MOTS 'old') (MOTS 'new') FIELD renames some of them": "NOMC (MOTS 'ancien') (MOTS 'nouveau') CHAMP en renomme certaines",
+    "{word} (MOTS 'old') (MOTS 'new') FIELD renames some of them": "{word} (MOTS 'ancien') (MOTS 'nouveau') CHAMP en renomme certaines",
     "two components would have one name": "deux composantes auraient un même nom",
     "there is no {what} {n}: this zone has {size}": "il n'y a pas de {what} {n} : cette zone en a {size}",
     "the zone {zone} has no component {name}; it has {known}": "la zone {zone} n'a pas de composante {name} ; elle a {known}",

@@ -225,7 +225,6 @@ MESH = {
     "EXCO keeps the components wanted: EXCO (MOTS 'UX' 'UY') CH (MOTS 'UX' 'UY')": "EXCO garde les composantes voulues : EXCO (MOTS 'UX' 'UY') CH (MOTS 'UX' 'UY')",
     "arrows of an element field are not available yet": "les flèches d'un champ par éléments ne sont pas encore disponibles",
     "CHAN 'CHPO' makes a nodal field of it": "CHAN 'CHPO' en fait un champ par points",
-    "the picture {path} cannot be written ({reason})": "l'image {path} ne peut pas être écrite ({reason})",
     "no picture is drawn: the package {package} is not installed": "aucune image n'est dessinée : le paquet {package} n'est pas installé",
     "{install}": "{install}",
     "the field has no value on what is drawn": "le champ n'a pas de valeur sur ce qui est dessiné",

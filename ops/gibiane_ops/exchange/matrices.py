@@ -39,7 +39,6 @@ def _matrix(ctx: Context, mat: bool, market: bool, whole: bool, k: Rigidite) -> 
         kept = sp.coo_array((matrix + matrix.T) / 2 if system.symmetric else matrix)
         mmwrite(path, kept, comment=comment, symmetry=symmetry, precision=17)
     except OSError as failure:
-        reason = (failure.strerror or "unknown reason").lower()
-        ctx.fail(1130, "the file {path} cannot be written ({reason})", path=path.as_posix(), reason=reason)
+        ctx.cannot_write(path, failure)
     if ctx.option("ECHO") >= 1:
         ctx.write(f" SORTIR : {path.as_posix()}, {np.shape(matrix)[0]} lignes")

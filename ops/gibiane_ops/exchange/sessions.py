@@ -97,8 +97,7 @@ def _sauv(ctx: Context, q: Operands) -> None:
     except NotSaveable as failure:
         ctx.fail(39, "a {type} cannot be saved", type=failure.type_name, hint="SAUV with the names of the others")
     except OSError as failure:
-        reason = (failure.strerror or "unknown reason").lower()
-        ctx.fail(1130, "the file {path} cannot be written ({reason})", path=path.as_posix(), reason=reason)
+        ctx.cannot_write(path, failure)
     if not silent and ctx.option("ECHO") >= 1:
         ctx.write(f" SAUV : {len(chosen)} objets dans {path.as_posix()}")
 

@@ -43,8 +43,7 @@ def _sort(ctx: Context, q: Operands) -> Any:
     try:
         _write(ctx, path, word, content)
     except OSError as failure:
-        reason = (failure.strerror or "unknown reason").lower()
-        ctx.fail(1130, "the file {path} cannot be written ({reason})", path=path.as_posix(), reason=reason)
+        ctx.cannot_write(path, failure)
     if ctx.option("ECHO") >= 1:
         ctx.write(f" SORTIR : {path.as_posix()}")
     return None

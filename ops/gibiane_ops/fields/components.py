@@ -128,8 +128,8 @@ NOMC = operator(
 )
 
 
-@NOMC.form(Arg("name", MOT, "new name"), Arg("field", FIELD, "field"), NATURE, gives=["CHPOINT|MCHAML"])
-def _nomc(ctx: Context, name: str, field: Field, nature: str | None) -> Field:
+def rename_only(ctx: Context, name: str, field: Field, nature: str | None, word: str) -> Field:
+    """Give another name to the one component of a field."""
     if len(field.names) != 1:
         ctx.fail(
             21,
@@ -137,9 +137,15 @@ def _nomc(ctx: Context, name: str, field: Field, nature: str | None) -> Field:
             at="field",
             count=len(field.names),
             known=" ".join(field.names),
-            hint="NOMC (MOTS 'old') (MOTS 'new') FIELD renames some of them",
+            word=word,
+            hint="{word} (MOTS 'old') (MOTS 'new') FIELD renames some of them",
         )
     return with_nature(ctx, chosen(field, field.names, [name.strip()]), nature)
+
+
+@NOMC.form(Arg("name", MOT, "new name"), Arg("field", FIELD, "field"), NATURE, gives=["CHPOINT|MCHAML"])
+def _nomc(ctx: Context, name: str, field: Field, nature: str | None) -> Field:
+    return rename_only(ctx, name, field, nature, "NOMC")
 
 
 @NOMC.form(

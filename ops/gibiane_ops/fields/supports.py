@@ -9,14 +9,14 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend, operator
 from gibiane.values import CHPOINT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT
-from gibiane_ops.fields.components import rename, with_nature
+from gibiane_ops.fields.components import rename, rename_only
 from gibiane_ops.fields.making import mesh_zones
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import SUPPORTS, integrals, moved, support_points
 from gibiane_ops.kernels.topology import places_in, used_nodes
-from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field, chosen
+from gibiane_ops.values.algebra import SCAL, SCALAIRE, Field
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml, Part
 from gibiane_ops.values.listes import ListMots
 from gibiane_ops.values.maillage import Maillage, Point
@@ -151,16 +151,7 @@ def _retitled(ctx: Context, titre: bool, field: ChPoint, text: str) -> ChPoint:
     gives=["CHPOINT|MCHAML"],
 )
 def _renamed(ctx: Context, comp: bool, name: str, field: Field, nature: str | None) -> Field:
-    if len(field.names) != 1:
-        ctx.fail(
-            21,
-            "the field has {count} components ({known}): which is to be renamed?",
-            at="field",
-            count=len(field.names),
-            known=" ".join(field.names),
-            hint="CHAN 'COMP' (MOTS 'old') (MOTS 'new') FIELD renames some of them",
-        )
-    return with_nature(ctx, chosen(field, field.names, [name.strip()]), nature)
+    return rename_only(ctx, name, field, nature, "CHAN 'COMP'")
 
 
 @CHAN.form(

@@ -108,8 +108,8 @@ def element_stiffness(shape: Shape, X: FloatArray, D: FloatArray, *, axisymmetri
 
 def _ring_stiffness(shape: Shape, X: FloatArray, D: FloatArray) -> FloatArray:
     """Return the stiffness of axisymmetric cells: the hoop strain couples values with gradients, so B is formed."""
-    points, weights = shape.gauss
-    factor = geometry.measure_densities(shape, X, points) * geometry.circumferences(shape, X, points) * weights
+    points = shape.gauss[0]
+    factor = geometry.point_measures(shape, X, shape.gauss, axisymmetric=True)
     K = np.empty((len(X), 2 * shape.n_nodes, 2 * shape.n_nodes))
     for start in range(0, len(X), CHUNK):
         part = slice(start, start + CHUNK)
@@ -393,15 +393,8 @@ def distributed_load(shape: Shape, X: FloatArray, density: ArrayLike, *, axisymm
     N = shape.N(points)
     value = np.asarray(density, np.float64)
     at_points = np.matmul(N, value) if value.ndim == 3 else np.atleast_2d(value)[:, None, :]
-    factor = _mass_weights(shape, X, axisymmetric)
+    factor = geometry.point_measures(shape, X, shape.mass_gauss, axisymmetric=axisymmetric)
     return np.asarray(np.matmul(N.T, at_points * factor[..., None]), np.float64)
-
-
-def _mass_weights(shape: Shape, X: FloatArray, axisymmetric: bool) -> FloatArray:
-    """Return the measures that the points of the mass rule stand for, (m, q)."""
-    points, weights = shape.mass_gauss
-    factor = geometry.measure_densities(shape, X, points) * weights
-    return factor * geometry.circumferences(shape, X, points) if axisymmetric else factor
 
 
 def element_mass(shape: Shape, X: FloatArray, density: ArrayLike = 1.0, *, axisymmetric: bool = False) -> FloatArray:
@@ -421,7 +414,10 @@ def element_mass(shape: Shape, X: FloatArray, density: ArrayLike = 1.0, *, axisy
         ``M_ab = int density N_a N_b``; every displacement component has the same.
     """
     N = shape.N(shape.mass_gauss[0])
-    factor = _mass_weights(shape, X, axisymmetric) * np.asarray(density, np.float64)[..., None]
+    factor = (
+        geometry.point_measures(shape, X, shape.mass_gauss, axisymmetric=axisymmetric)
+        * np.asarray(density, np.float64)[..., None]
+    )
     products = (N[:, :, None] * N[:, None, :]).reshape(len(N), -1)
     return (factor @ products).reshape(len(X), shape.n_nodes, shape.n_nodes)
 

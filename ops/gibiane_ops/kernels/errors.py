@@ -111,22 +111,6 @@ class SingularSystem(KernelError):
 
 
 @dataclass(eq=False)
-class Hypostatic(KernelError):
-    """Solids left free to move as rigid bodies.
-
-    Attributes
-    ----------
-    motions : list
-        One record per free motion, see ``rigid.FreeMotion``.
-    """
-
-    motions: list[object]
-
-    def __str__(self) -> str:
-        return "; ".join(str(motion) for motion in self.motions)
-
-
-@dataclass(eq=False)
 class NotConverged(KernelError):
     """An iteration that did not reach its tolerance.
 

@@ -96,6 +96,30 @@ def measure_densities(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray
     return np.asarray(np.sqrt(np.maximum(_determinants(gram), 0.0)), np.float64)
 
 
+def point_measures(
+    shape: Shape, X: FloatArray, rule: tuple[FloatArray, FloatArray], *, axisymmetric: bool = False
+) -> FloatArray:
+    """Compute the measures that the points of a quadrature rule stand for.
+
+    Parameters
+    ----------
+    shape : Shape
+    X : (m, n_nodes, space_dim) float64, length
+    rule : (q, dim) and (q,) float64
+        Points and weights in the reference element.
+    axisymmetric : bool
+        The integral goes once round the axis.
+
+    Returns
+    -------
+    (m, q) float64
+        Their sum over q is the measure of the cell.
+    """
+    points, weights = rule
+    measure = measure_densities(shape, X, points) * weights
+    return measure * circumferences(shape, X, points) if axisymmetric else measure
+
+
 def circumferences(shape: Shape, X: FloatArray, xi: FloatArray) -> FloatArray:
     """Compute the length of the circles that points of a meridian plane describe about the axis.
 

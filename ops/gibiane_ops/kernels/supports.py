@@ -176,7 +176,5 @@ def integrals(
     rule = shape.gauss if at_points else shape.mass_gauss
     if not at_points:
         values = moved(shape, values, support, "MASSE")
-    weight = geometry.measure_densities(shape, X, rule[0]) * rule[1]
-    if axisymmetric:
-        weight = weight * geometry.circumferences(shape, X, rule[0])
+    weight = geometry.point_measures(shape, X, rule, axisymmetric=axisymmetric)
     return np.asarray((weight[..., None] * values).sum(axis=1), np.float64)

@@ -48,6 +48,14 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
             at=at,
             names=" ".join(size.names) or "none",
         )
+    values = _everywhere(ctx, size, name, nodes, at)
+    if not (values > 0).all():
+        ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=f"{values.min():.6g}")
+    return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
+
+
+def _everywhere(ctx: Context, size: ChPoint, name: str, nodes: IntArray, at: str) -> FloatArray:
+    """Return the values of a component at nodes, all of which must have one."""
     missing = np.setdiff1d(nodes, size.parts[name][0])
     if len(missing):
         ctx.fail(
@@ -58,10 +66,7 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
             total=len(nodes),
             hint="it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field",
         )
-    values = size.at(name, nodes)
-    if not (values > 0).all():
-        ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=f"{values.min():.6g}")
-    return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
+    return size.at(name, nodes)
 
 
 METRIC = {2: ("G11", "G21", "G22"), 3: ("G11", "G21", "G22", "G31", "G32", "G33")}
@@ -90,18 +95,8 @@ def metric_at(ctx: Context, size: Size, nodes: IntArray, dim: int) -> FloatArray
         )
     result = np.zeros((len(nodes), dim, dim))
     for name in wanted:
-        missing = np.setdiff1d(nodes, size.parts[name][0])
-        if len(missing):
-            ctx.fail(
-                181,
-                "the field of sizes has no value at {count} of {total} nodes",
-                at="size",
-                count=len(missing),
-                total=len(nodes),
-                hint="it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field",
-            )
         i, j = int(name[1]) - 1, int(name[2]) - 1
-        result[:, i, j] = result[:, j, i] = size.at(name, nodes)
+        result[:, i, j] = result[:, j, i] = _everywhere(ctx, size, name, nodes, "size")
     finite = np.isfinite(result).all(axis=(1, 2), keepdims=True)
     bad = np.linalg.eigvalsh(np.where(finite, result, 0.0))[:, 0] <= 0
     if bad.any():

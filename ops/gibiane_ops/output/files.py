@@ -61,12 +61,7 @@ def _sort_vtk(ctx: Context, q: Operands) -> Any:
         with worded(ctx):
             write_mesh(path, points, local, at_points, in_cells)
     except OSError as failure:
-        ctx.fail(
-            1130,
-            "the file {path} cannot be written ({reason})",
-            path=path.as_posix(),
-            reason=(failure.strerror or "unknown reason").lower(),
-        )
+        ctx.cannot_write(path, failure)
     if ctx.option("ECHO") >= 1:
         ctx.write(f" SORTIR : {path.as_posix()}")
     return None

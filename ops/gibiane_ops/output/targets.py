@@ -104,12 +104,7 @@ def draw(
         with worded(ctx, at=at):
             _attempt(ctx, picture, path)
     except OSError as failure:
-        ctx.fail(
-            1130,
-            "the picture {path} cannot be written ({reason})",
-            path=path.as_posix(),
-            reason=(failure.strerror or "unknown reason").lower(),
-        )
+        ctx.cannot_write(path, failure)
 
 
 def _show(picture: Callable[[Path], None], window: Callable[[], None] | None) -> None:

@@ -229,7 +229,7 @@ class SolvedContact:
         Relative displacement at the slave nodes in these axes.
     gap : (n,) float64, length
         Initial gap at the slave nodes.
-    pair_force, pair_relative, pair_gap : as above
+    pair_force, pair_relative : as above
         The same on the changed basis of quadratic facets, on which the law of contact holds.
     mu : (n,) float64
         Friction coefficient, 0 without friction.
@@ -245,7 +245,6 @@ class SolvedContact:
     gap: FloatArray
     pair_force: FloatArray
     pair_relative: FloatArray
-    pair_gap: FloatArray
     mu: FloatArray
     motion: float
 
@@ -288,7 +287,6 @@ def solved_contacts(
                 pairs.at_nodes(gap),
                 pair_force,
                 pair_relative,
-                gap,
                 np.zeros(len(slave)) if mu is None else mu,
                 float(np.abs(u.table(DISPLACEMENTS[kind], slave)).max(initial=0.0)),
             )

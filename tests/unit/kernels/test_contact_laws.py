@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from interfaces import bare_interface
 
 from gibiane_ops.kernels.contact.cone import orthogonal_projection, radial_projection
-from gibiane_ops.kernels.contact.interface import bare_interface
 from gibiane_ops.kernels.contact.newton import solve_coulomb, solve_tied
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState
 from gibiane_ops.kernels.contact.status import solve_statuses
@@ -99,10 +99,10 @@ def test_slip_counts_from_its_origin():
     interface = bare_interface(np.diag([7.0, 5.0]), np.array([10, 4.0]), 2)
     loaded = solve_coulomb(interface, 0.2)
     assert loaded.w[0, 1] == pytest.approx(0.4)
-    half = solve_coulomb(interface.with_load(np.array([10, 2.0])), 0.2, slip_origin=loaded.w[:, 1:])
+    half = solve_coulomb(replace(interface, f=np.array([10, 2.0])), 0.2, slip_origin=loaded.w[:, 1:])
     assert half.status[0] == STICK
     np.testing.assert_allclose(half.w, loaded.w, atol=1e-12)
-    back = solve_coulomb(interface.with_load(np.array([10, -3.0])), 0.2, slip_origin=half.w[:, 1:])
+    back = solve_coulomb(replace(interface, f=np.array([10, -3.0])), 0.2, slip_origin=half.w[:, 1:])
     assert back.status[0] == SLIP
     assert back.w[0, 1] == pytest.approx(-0.2)
     assert back.r[0, 1] == pytest.approx(2.0)
@@ -132,7 +132,7 @@ def test_strip_on_a_floor_loaded_unloaded_and_loaded_again():
     def pull(value, before):
         load = f.copy()
         load[-1] = value
-        return solve_coulomb(bar.with_load(load), mu, start=before, slip_origin=before and before.w[:, 1:])
+        return solve_coulomb(replace(bar, f=load), mu, start=before, slip_origin=before and before.w[:, 1:])
 
     first = pull(s, None)
     rest = pull(0.0, first)
@@ -174,7 +174,7 @@ def test_wedge_pushed_between_walls_and_released(degrees, mu, unit):
     # the spring balances both forces of the wall
     slip = N * (np.cos(a) - mu * np.sin(a)) / (k * np.sin(a))
     np.testing.assert_allclose(pushed.w, [[0, -slip]], rtol=1e-9, atol=1e-12)
-    bare = wedge.with_load(np.zeros(2))
+    bare = replace(wedge, f=np.zeros(2))
     stuck = replace(pushed, r=(bare.S @ pushed.w.ravel()).reshape(1, 2))
     released = solve_coulomb(bare, mu, start=stuck, slip_origin=pushed.w[:, 1:])
     kept = k * slip * np.sin(a) * np.cos(a) if np.tan(a) <= mu else 0.0

@@ -148,7 +148,7 @@ def test_patch_keeps_the_spacing_of_its_sides():
 def test_swept_elements_have_the_volume_of_the_prism():
     base = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     layers = np.arange(12).reshape(3, 4)
-    points = sweep.translated_layers(base, np.array([0.2, 0.1, 2.0]), np.array([0, 0.3, 1.0])).reshape(-1, 3)
+    points = sweep.ruled_layers(base, base + [0.2, 0.1, 2.0], np.array([0, 0.3, 1.0])).reshape(-1, 3)
     for name, cells, area in (("QUA4", [[0, 1, 2, 3]], 1.0), ("TRI3", [[0, 1, 2], [0, 2, 3]], 1.0)):
         solid, nodes = sweep.sweep_cells(name, np.array(cells), layers)
         volume = geometry.measures(shape(solid), points[nodes])

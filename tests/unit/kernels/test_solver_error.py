@@ -1,5 +1,7 @@
 """The estimate of what contact iterations have left against the true distance to the converged solution."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from two_blocks import blocks
@@ -77,7 +79,7 @@ def test_slips_of_earlier_load_steps_count():
     interface = blocks("T1_1h").interface
     first = solve_coulomb(interface, 0.2)
     origin = first.w[:, 1:]
-    half = interface.with_load(0.5 * interface.f)
+    half = replace(interface, f=0.5 * interface.f)
     exact = solve_coulomb(half, 0.2, slip_origin=origin, start=first, tolerance=1e-13)
     state = truncated(solve_gauss_seidel, half, 0.2, (), 3)
     away = (state.w - exact.w).ravel()

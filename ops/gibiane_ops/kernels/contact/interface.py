@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,10 +76,6 @@ class Interface:
         earlier = 0.0 if slip_origin is None else float(np.abs(slip_origin).max(initial=0))
         return self.force_scale or self.kref * earlier
 
-    def with_load(self, f: FloatArray, gap: FloatArray | None = None) -> Interface:
-        """Replace the load, and the gaps if given, keeping S."""
-        return replace(self, f=f, gap=self.gap if gap is None else gap)
-
     def to_global(self, local: FloatArray) -> FloatArray:
         """Turn (n, d) local components into global ones."""
         return np.asarray(np.einsum("nij,ni->nj", self.frames, local))
@@ -108,32 +104,3 @@ class Interface:
         if self.expander is None:
             raise BadValue("interface", "a bare matrix", "an interface condensed from a mesh")
         return self.expander(w)
-
-
-def bare_interface(S: FloatArray, f: FloatArray, dim: int, gap: FloatArray | None = None) -> Interface:
-    """Build an interface from its matrix and load alone, in axes (n, t1 (, t2)).
-
-    Parameters
-    ----------
-    S : (n dim, n dim) float64, symmetric positive semidefinite
-    f : (n dim,) float64
-    dim : int
-        Components of a pair, normal first: 2 or 3.
-    gap : (n,) float64, optional
-        Initial gaps, zero when left out.
-
-    Returns
-    -------
-    Interface
-
-    Cost
-    ----
-    One dense eigenvalue decomposition, for the free motions.
-    """
-    n = len(f) // dim
-    kref = float(np.mean(np.diag(S)))
-    values, vectors = np.linalg.eigh(S)
-    frames = np.broadcast_to(np.eye(dim), (n, dim, dim))
-    gap = np.zeros(n) if gap is None else np.asarray(gap, dtype=np.float64)
-    active = np.ones((n, dim), dtype=bool)
-    return Interface(S, f, gap, frames, active, vectors[:, values < FREE_LIMIT * kref], kref)

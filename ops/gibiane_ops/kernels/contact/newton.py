@@ -187,11 +187,10 @@ def _from_frozen_bounds(problem: Problem, tolerance: float, max_iter: int, histo
 
     The last of the problems with a frozen bound, each a convex one, gives Newton's first guess.
     """
-    law, guess = problem.law, problem.tied()
+    guess = problem.tied()
     for _ in range(_FROZEN):
-        bound = np.minimum(law.bound(guess[1][:, 0]), 1e6)
-        frozen = replace(law, mu=np.zeros_like(bound), cohesion=bound, when_open=True)
-        found = robust_steps(replace(problem, law=frozen), guess, tolerance, max_iter, history)
+        frozen = problem.with_bound(problem.friction_bound(*guess))
+        found = robust_steps(frozen, guess, tolerance, max_iter, history)
         guess = found.w, found.r
     return newton_steps(problem, guess, tolerance, _FEW, history)[0]
 

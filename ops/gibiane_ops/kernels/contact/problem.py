@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ BoolArray = NDArray[np.bool_]
 
 REGULARISATION = 1e-8
 """Stiffness, relative to kref, given to free rigid motions in the Newton matrix only: the residual stays exact."""
+
+UNREACHED = 1e6
+"""Bound of friction, over the largest load, that stands for infinity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +92,18 @@ class Problem:
         s = self.law.length(t, bound, self.gamma)[0]
         ratio = np.divide(s, t, out=np.zeros_like(t), where=t > 0)
         return np.column_stack([normal, ratio[:, None] * a[:, 1:]]), self._status(closed, t, bound)
+
+    def friction_bound(self, w: FloatArray, r: FloatArray) -> FloatArray:
+        """Give the bounds of friction, at most ``UNREACHED``, for the normal forces that the law cuts.
+
+        Round-off in the force of an open pair would keep its whole cohesion.
+        """
+        return np.minimum(self._normal(self.augmented(w, r))[2], UNREACHED)
+
+    def with_bound(self, bound: FloatArray) -> Problem:
+        """Freeze the bound of friction, on open pairs too: Tresca's problem, convex."""
+        law = replace(self.law, mu=np.zeros_like(bound), cohesion=bound, when_open=True)
+        return replace(self, law=law)
 
     def _normal(self, a: FloatArray) -> tuple[BoolArray, FloatArray, FloatArray]:
         """Give the closed pairs, their normal forces and the bounds of friction."""

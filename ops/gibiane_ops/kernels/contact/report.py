@@ -17,6 +17,9 @@ OPEN, STICK, SLIP = 0, 1, 2
 ROUND_OFF = 1e-9
 """Force of a pair, over the largest, that iterations leave on an open one."""
 
+APART = 1e-5
+"""Opening, over the largest displacement, beyond which a pair is open whatever its force."""
+
 
 @dataclass(frozen=True, eq=False)
 class ContactReport:
@@ -138,11 +141,11 @@ def check_state(
     length = max(float(np.abs(w).max(initial=0)), force / interface.kref)
     bonded = np.zeros(len(w), dtype=bool) if bonded is None else bonded
     slip = law.slip_of(w[:, 1:] - (0.0 if slip_origin is None else slip_origin), r[:, 1:])
-    # cohesion holds pairs in contact only: a pair without any force is open, whatever the sign of its round-off
-    idle = ~bonded & (norms(r) <= ROUND_OFF * force)
+    opening = interface.gap - w[:, 0]
+    # cohesion holds pairs in contact only: a pair without force, or apart, is open whatever the sign of its round-off
+    idle = ~bonded & ((norms(r) <= ROUND_OFF * force) | (opening > APART * length))
     bound = _reachable(law, np.where(idle, 0.0, r[:, 0]), slip, bonded)
     finite = np.where(np.isfinite(bound), bound, 0.0)
-    opening = interface.gap - w[:, 0]
     apart = np.where(bonded, -np.abs(opening), opening)
     allowed = np.where(bonded, law.adhesion, 0.0)
     power = np.einsum("ni,ni->n", r[:, 1:], slip)

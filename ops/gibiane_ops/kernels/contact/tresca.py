@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
@@ -71,16 +69,13 @@ def solve_tresca_sequence(
     law.need_no_adhesion("the Tresca fixed point")
     problem = Problem.of(interface, law, 1.0, slip_origin)
     now = first_guess(problem, start)
-    huge = 1e6  # a bound that no force of the interface reaches stands for infinity
-    bound = np.minimum(problem.law.bound(now[1][:, 0]), huge)
+    bound = problem.friction_bound(*now)
     history = History()
     converged = False
     for _ in range(max_iter):
-        frozen = replace(problem.law, mu=np.zeros_like(bound), cohesion=bound, when_open=True)
-        inner = History()
-        found = robust_steps(replace(problem, law=frozen), now, 1e-10, 60, inner)
+        found = robust_steps(problem.with_bound(bound), now, 1e-10, 60, History())
         now = found.w, found.r
-        new = np.minimum(problem.law.bound(now[1][:, 0]), huge)
+        new = problem.friction_bound(*now)
         scale = float(new.max(initial=0))
         change = float(np.abs(new - bound).max(initial=0))
         history.add(change / scale if scale else change, problem.project(problem.augmented(*now))[1])

@@ -68,5 +68,4 @@ CU20 = Shape(
     gmsh_type=17,
     meshio_name="hexahedron20",
     n_corners=CUB8.n_corners,
-    gmsh_order=(0, 1, 2, 3, 4, 5, 6, 7, 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15),
 )

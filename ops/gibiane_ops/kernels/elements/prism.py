@@ -92,5 +92,4 @@ PR15 = Shape(
     gmsh_type=18,
     meshio_name="wedge15",
     n_corners=PRI6.n_corners,
-    gmsh_order=(0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11),
 )

@@ -107,5 +107,4 @@ PY13 = Shape(
     gmsh_type=19,
     meshio_name="pyramid13",
     n_corners=PYR5.n_corners,
-    gmsh_order=(0, 1, 2, 3, 4, 5, 8, 10, 6, 7, 9, 11, 12),
 )

@@ -46,8 +46,6 @@ class Shape:
         Cell name of meshio.
     n_corners : int
         The first n_corners nodes are the corners; a facet is identified by its corners.
-    gmsh_order : tuple of int
-        Node i is node ``gmsh_order[i]`` of gmsh; empty when the numberings agree.
     """
 
     name: str
@@ -63,7 +61,6 @@ class Shape:
     gmsh_type: int
     meshio_name: str
     n_corners: int
-    gmsh_order: tuple[int, ...] = ()
 
     @property
     def n_nodes(self) -> int:

@@ -19,7 +19,6 @@ SHAPES: dict[str, Shape] = {
     for each in (POI1, SEG2, TRI3, QUA4, TET4, PYR5, PRI6, CUB8, SEG3, TRI6, QUA8, TE10, PY13, PR15, CU20)
 }
 BY_MESHIO: dict[str, Shape] = {each.meshio_name: each for each in SHAPES.values()}
-BY_GMSH: dict[int, Shape] = {each.gmsh_type: each for each in SHAPES.values()}
 
 
 def quadratic(name: str) -> Shape:

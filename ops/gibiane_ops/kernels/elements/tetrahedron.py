@@ -41,5 +41,4 @@ TE10 = Shape(
     gmsh_type=11,
     meshio_name="tetra10",
     n_corners=TET4.n_corners,
-    gmsh_order=(0, 1, 2, 3, 4, 5, 6, 7, 9, 8),
 )

@@ -81,10 +81,7 @@ def _integration(shape: Shape, X: FloatArray, axisymmetric: bool) -> tuple[Float
     """Return the points of the rule, (q, dim), and the measures that they carry, (m, q)."""
     own = shape.degree == 1 and len(shape.stiffness_rule.weights) > 1
     rule = shape.stiffness_rule if own else shape.mass_rule
-    density = geometry.measure_densities(shape, X, rule.points) * rule.weights
-    if axisymmetric:
-        density = density * geometry.circumferences(shape, X, rule.points)
-    return rule.points, density
+    return rule.points, geometry.point_measures(shape, X, (rule.points, rule.weights), axisymmetric=axisymmetric)
 
 
 def _energy(stress: FloatArray, density: FloatArray, compliance: FloatArray) -> FloatArray:
@@ -120,9 +117,7 @@ def true_error(
     SolidError
     """
     X = points[block.cells]
-    density = geometry.measure_densities(block.shape, X, rule.points) * rule.weights
-    if axisymmetric:
-        density = density * geometry.circumferences(block.shape, X, rule.points)
+    density = geometry.point_measures(block.shape, X, (rule.points, rule.weights), axisymmetric=axisymmetric)
     raw = np.matmul(block.shape.N(rule.points), extrapolate(block.shape, block.stress))
     return SolidError(
         _energy(exact - raw, density, compliance),

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.elements.table import SHAPES, shape
+from gibiane_ops.kernels.elements.table import BY_MESHIO, shape
 from gibiane_ops.kernels.errors import BadValue, MissingPackage, UnreadableFile
 from gibiane_ops.kernels.exchange.meshfile import MeshFile, numbered_groups
 from gibiane_ops.kernels.exchange.optistruct import read_fem
@@ -64,7 +64,6 @@ FORMATS = {
 }
 # Of one word, the extension tells the format.
 BY_EXTENSION = {".vtk": "vtk", ".vtu": "vtu", ".vtp": "vtp", ".xdmf": "xdmf"}
-_SHAPE = {of.meshio_name: name for name, of in SHAPES.items()}
 
 
 def read_mesh(path: Path, word: str) -> MeshFile:
@@ -91,7 +90,7 @@ def read_mesh(path: Path, word: str) -> MeshFile:
     of = FORMATS[word]
     if not of.reader:
         text = path.read_bytes().decode("latin-1")
-        found = read_fem(path.as_posix(), text, _SHAPE) if word == "FEM" else read_unv(path.as_posix(), text)
+        found = read_fem(path.as_posix(), text) if word == "FEM" else read_unv(path.as_posix(), text)
         return found.checked(path.as_posix())
     _need_h5py(word)
     meshio = _meshio()
@@ -133,10 +132,10 @@ def _guarded(path: Path, name: str, call: Callable[[], Any]) -> Any:
 
 def _content(mesh: Any, of: Format) -> MeshFile:
     """Gather the blocks of meshio by shape, with groups and fields."""
-    kept = [i for i, block in enumerate(mesh.cells) if block.type in _SHAPE and len(block.data)]
-    skipped = tuple(sorted({b.type for b in mesh.cells if b.type not in _SHAPE}))
-    names = list(dict.fromkeys(_SHAPE[mesh.cells[i].type] for i in kept))
-    sources = [[i for i in kept if _SHAPE[mesh.cells[i].type] == name] for name in names]
+    kept = [i for i, block in enumerate(mesh.cells) if block.type in BY_MESHIO and len(block.data)]
+    skipped = tuple(sorted({b.type for b in mesh.cells if b.type not in BY_MESHIO}))
+    names = list(dict.fromkeys(BY_MESHIO[mesh.cells[i].type].name for i in kept))
+    sources = [[i for i in kept if BY_MESHIO[mesh.cells[i].type].name == name] for name in names]
     cells = [np.concatenate([np.asarray(mesh.cells[i].data, np.int64) for i in own]) for own in sources]
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from gibiane_ops.kernels.elements.table import BY_MESHIO
 from gibiane_ops.kernels.errors import UnreadableFile
 from gibiane_ops.kernels.exchange.meshfile import MeshFile
 
@@ -31,15 +32,13 @@ SET_NAME = re.compile(r'\$HMSET\s+(\d+)\s+(\d+)\s+"([^"]*)"')
 FLOAT = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 
-def read_fem(path: str, text: str, shapes: dict[str, str]) -> MeshFile:
+def read_fem(path: str, text: str) -> MeshFile:
     """Read the text of a file of OptiStruct.
 
     Parameters
     ----------
     path : str
     text : str
-    shapes : dict of str to str
-        Our shapes by their names in meshio.
 
     Returns
     -------
@@ -80,11 +79,11 @@ def read_fem(path: str, text: str, shapes: dict[str, str]) -> MeshFile:
                 if len(nodes) not in CARDS[name]:
                     raise ValueError(card[1])
                 kind, order = CARDS[name][len(nodes)]
-                if kind not in shapes:
+                if kind not in BY_MESHIO:
                     skipped.add(name)
                     continue
-                rows = cells.setdefault(shapes[kind], [])
-                place[int(card[1])] = shapes[kind], len(rows)
+                rows = cells.setdefault(BY_MESHIO[kind].name, [])
+                place[int(card[1])] = BY_MESHIO[kind].name, len(rows)
                 owners.setdefault(int(card[2] or card[1]), []).append(int(card[1]))
                 rows.append([nodes[k] for k in order])
             elif name == "SET" and len(card) > 2 and card[2].upper() in ("GRID", "ELEM"):

@@ -58,23 +58,6 @@ def split_quadrangles(points: FloatArray, cells: IntArray) -> IntArray:
     return np.take_along_axis(cells, local, axis=1).reshape(-1, 3)
 
 
-def translated_layers(base: FloatArray, vector: FloatArray, places: FloatArray) -> FloatArray:
-    """Place the layers of a translation.
-
-    Parameters
-    ----------
-    base : (n, dim) float64, length
-    vector : (dim,) float64, length
-    places : (n_layers + 1,) float64
-        From 0 to 1.
-
-    Returns
-    -------
-    (n_layers + 1, n, dim) float64, length
-    """
-    return np.asarray(base[None] + places[:, None, None] * vector, np.float64)
-
-
 def ruled_layers(base: FloatArray, end: FloatArray, places: FloatArray) -> FloatArray:
     """Place the layers between two congruent sets of nodes, on straight lines.
 
