@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ ROUND_OFF = 1e-9
 """Force of a pair, over the largest, that iterations leave on an open one."""
 
 APART = 1e-5
-"""Opening, over the largest displacement, beyond which a pair is open whatever its force."""
+"""Opening, over the largest displacement, beyond which a pair has no cohesion whatever its force."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +142,10 @@ def check_state(
     bonded = np.zeros(len(w), dtype=bool) if bonded is None else bonded
     slip = law.slip_of(w[:, 1:] - (0.0 if slip_origin is None else slip_origin), r[:, 1:])
     opening = interface.gap - w[:, 0]
-    # cohesion holds pairs in contact only: a pair without force, or apart, is open whatever the sign of its round-off
-    idle = ~bonded & ((norms(r) <= ROUND_OFF * force) | (opening > APART * length))
-    bound = _reachable(law, np.where(idle, 0.0, r[:, 0]), slip, bonded)
+    # cohesion holds pairs in contact only: a pair without any force is open, whatever the sign of its round-off
+    idle = ~bonded & (norms(r) <= ROUND_OFF * force)
+    held = replace(law, cohesion=np.where(~bonded & (opening > APART * length), 0.0, law.cohesion))
+    bound = _reachable(held, np.where(idle, 0.0, r[:, 0]), slip, bonded)
     finite = np.where(np.isfinite(bound), bound, 0.0)
     apart = np.where(bonded, -np.abs(opening), opening)
     allowed = np.where(bonded, law.adhesion, 0.0)
