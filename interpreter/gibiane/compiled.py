@@ -24,15 +24,15 @@ _NUMBERS = (int, float)
 
 
 class Fallback(Exception):
-    """An evaluation that is not for the closures."""
+    """An evaluation that is not for the closures.
 
-
-FALLBACK = Fallback()
+    Raised as a class: one instance raised again and again would gather the frames of all, and every session with them.
+    """
 
 
 def _quotient(a: Any, b: Any) -> Any:
     if b == 0:
-        raise FALLBACK
+        raise Fallback
     if type(a) is int and type(b) is int:
         q = abs(a) // abs(b)
         return q if (a >= 0) == (b >= 0) else -q
@@ -41,7 +41,7 @@ def _quotient(a: Any, b: Any) -> Any:
 
 def _power(a: Any, b: Any) -> Any:
     if a <= 0 or (type(b) is int and type(a) is int):
-        raise FALLBACK
+        raise Fallback
     return a**b
 
 
@@ -200,7 +200,7 @@ def _equality(
 
     def fetch(frame: Frame) -> bool:
         if frame.lookup("EGA") is not _ABSENT:
-            raise FALLBACK
+            raise Fallback
         return _equal(a(frame), b(frame))
 
     return fetch
@@ -263,7 +263,7 @@ def _variable(name: str) -> Fetch:
         kind = type(value)
         if kind is float or kind is int:
             return value
-        raise FALLBACK
+        raise Fallback
 
     return fetch
 
@@ -282,19 +282,19 @@ def _element(nodes: Sequence[Node]) -> Fetch | None:
         value = frame.lookup(name)
         for index in indices:
             if type(value) is not Table:
-                raise FALLBACK
+                raise Fallback
             key = index(frame)  # type: ignore[misc]
             kind = type(key)
             if kind is not int and kind is not str:
-                raise FALLBACK
+                raise Fallback
             found = value.entries.get(key if kind is int else key.rstrip())
             if found is None:
-                raise FALLBACK
+                raise Fallback
             value = found[1]
         kind = type(value)
         if kind is float or kind is int:
             return value
-        raise FALLBACK
+        raise Fallback
 
     return fetch
 
