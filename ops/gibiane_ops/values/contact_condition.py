@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane_ops.kernels.constraints import Reduction
-from gibiane_ops.kernels.contact.condense import Condensation
+from gibiane_ops.kernels.contact.condensation import Condensation
 from gibiane_ops.kernels.contact.conditioning import condensed_condition, spring_condition
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.report import OPEN, ContactState

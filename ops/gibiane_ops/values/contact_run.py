@@ -9,7 +9,7 @@ from typing import Any
 
 from gibiane.registry import Context
 from gibiane_ops.kernels.constraints import Reduction
-from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution
+from gibiane_ops.kernels.contact.condensation import Condensation, TiedSolution
 from gibiane_ops.kernels.contact.correction import Corrected
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction

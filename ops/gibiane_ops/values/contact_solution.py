@@ -11,7 +11,8 @@ from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import errors as k_errors
 from gibiane_ops.kernels.constraints import reduce_conditions
-from gibiane_ops.kernels.contact.condense import TiedSolution, condense
+from gibiane_ops.kernels.contact.condensation import TiedSolution
+from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.correction import Corrected, solve_stuck
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels.contact.condense import Condensation
+from gibiane_ops.kernels.contact.condensation import Condensation
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.pairs import ContactPairs

@@ -233,9 +233,9 @@ def test_schur_complement_of_pardiso(monkeypatch):
         partial = PardisoSchur(bodies.tied.A, bodies._Kvw, sp.csr_array(bodies._fields.Bw.T @ bodies._KBw))
         np.testing.assert_allclose(partial.S, S, atol=1e-12 * np.abs(S).max())
         np.testing.assert_allclose(bodies.tied.A @ partial.solve(b), b, atol=1e-10)
-        monkeypatch.setattr("gibiane_ops.kernels.contact.condense.SCHUR_UNKNOWNS", 0)
-        monkeypatch.setattr("gibiane_ops.kernels.contact.condense.SCHUR_COMPONENTS", 0)
-        monkeypatch.setattr("gibiane_ops.kernels.contact.condense.schur", None)  # not called
+        monkeypatch.setattr("gibiane_ops.kernels.contact.condensation.SCHUR_UNKNOWNS", 0)
+        monkeypatch.setattr("gibiane_ops.kernels.contact.condensation.SCHUR_COMPONENTS", 0)
+        monkeypatch.setattr("gibiane_ops.kernels.contact.condensation.schur", None)  # not called
         _, other = bodies_of(name)
         np.testing.assert_allclose(other.exact().S, S, atol=1e-12 * np.abs(S).max())
         monkeypatch.undo()

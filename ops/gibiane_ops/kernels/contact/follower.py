@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
-from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution
+from gibiane_ops.kernels.contact.condensation import Condensation, TiedSolution
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.tied import PASSES
 

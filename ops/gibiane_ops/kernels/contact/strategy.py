@@ -9,7 +9,8 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.choice import Choice, choose, direct_memory
-from gibiane_ops.kernels.contact.condense import Condensation, TiedSolution, interface_memory
+from gibiane_ops.kernels.contact.condensation import Condensation, TiedSolution
+from gibiane_ops.kernels.contact.condense import interface_memory
 from gibiane_ops.kernels.contact.correction import (
     Again,
     Corrected,
