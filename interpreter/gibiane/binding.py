@@ -185,7 +185,7 @@ class Operands:
                 return candidate
         return None
 
-    def need_keyword(self, words: Sequence[str], width: int = 4) -> str:
+    def need_keyword(self, words: Sequence[str]) -> str:
         """Read one of `words`.
 
         Raises
@@ -193,7 +193,7 @@ class Operands:
         GibianeError
             7 with the accepted list, when the first word is another or there is none.
         """
-        found = self.read_keyword(words, width)
+        found = self.read_keyword(words)
         if found is None:
             raise self.unknown_keyword(words)
         return found

@@ -12,7 +12,7 @@ from gibiane_ops.kernels.adapt import degrees, moving
 from gibiane_ops.kernels.adapt.orders import singular_orders
 from gibiane_ops.kernels.adapt.sizes import element_sizes, nodal_sizes
 from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
-from gibiane_ops.kernels.assembly import internal_forces
+from gibiane_ops.kernels.elasticity import internal_forces
 from gibiane_ops.kernels.elements.quadratic import LINEAR, QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.algebra import SCAL

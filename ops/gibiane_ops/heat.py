@@ -9,7 +9,7 @@ import numpy as np
 from gibiane.forms import Arg
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, MMODEL, RIGIDITE
-from gibiane_ops.kernels import assembly, heat, topology
+from gibiane_ops.kernels import assembly, heat, integrals, topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.champs import DISCRET, ChPoint, MChaml
@@ -104,7 +104,7 @@ def _cond(ctx: Context, model: Modele, material: MChaml) -> Rigidite:
         exchange = "CONVECTION" in zone.law
         name = "H" if exchange else "K"
         value = properties(ctx, material, zone, (name,), "material", f"COND needs {name}")[..., 0]
-        compute = assembly.element_mass if exchange else heat.element_conduction
+        compute = integrals.element_mass if exchange else heat.element_conduction
         with worded(ctx, at="model"):
             each.append(compute(shape(zone.shape), _corners(ctx, zone), value, axisymmetric=zone.axisymmetric))
     return _matrix(ctx, zones, each)
@@ -117,7 +117,7 @@ def _capa(ctx: Context, model: Modele, material: MChaml) -> Rigidite:
         value = properties(ctx, material, zone, ("RHO", "C"), "material", "CAPA needs RHO and C").prod(axis=-1)
         of, x = shape(zone.shape), _corners(ctx, zone)
         with worded(ctx, at="model"):
-            each.append(assembly.element_mass(of, x, value, axisymmetric=zone.axisymmetric))
+            each.append(integrals.element_mass(of, x, value, axisymmetric=zone.axisymmetric))
     return _matrix(ctx, zones, each)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, MCHAML, MMODEL, POINT
-from gibiane_ops.kernels import assembly, topology
+from gibiane_ops.kernels import assembly, integrals, topology
 from gibiane_ops.kernels.contact.outward import facets_of_body
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
@@ -228,7 +228,7 @@ def _pressure(ctx: Context, zones: list[ModelZone], facets: Loaded, value: Calla
         ctx.fail(21, "{reason}", at="g", reason=failure.reason, hint="is the model made of the solid that has them?")
     with worded(ctx, at="g"):
         forces = [
-            (c, assembly.pressure_load(shape(n), x[c], value(c), axisymmetric=zone.axisymmetric)) for n, c in turned
+            (c, integrals.pressure_load(shape(n), x[c], value(c), axisymmetric=zone.axisymmetric)) for n, c in turned
         ]
     return _sum(ctx, zone, forces)
 
@@ -283,7 +283,7 @@ def _traction(ctx: Context, zone: ModelZone, facets: Loaded, value: Callable[[In
     x = node_store(ctx).coords[:, : zone.dim]
     with worded(ctx, at="g"):
         forces = [
-            (c, assembly.distributed_load(shape(n), x[c], value(c), axisymmetric=zone.axisymmetric)) for n, c in facets
+            (c, integrals.distributed_load(shape(n), x[c], value(c), axisymmetric=zone.axisymmetric)) for n, c in facets
         ]
     return _sum(ctx, zone, forces)
 
@@ -311,6 +311,6 @@ def _cneq(ctx: Context, model: Modele, field: ChPoint | MChaml, cara: MChaml | N
             density = density * properties(ctx, cara, zone, ("SECT",), "cara")[..., None, None]
         x = checked_corners(ctx, zone)
         with worded(ctx, at="model"):
-            each = assembly.distributed_load(shape(zone.shape), x, density, axisymmetric=zone.axisymmetric)
+            each = integrals.distributed_load(shape(zone.shape), x, density, axisymmetric=zone.axisymmetric)
         forces.append((zone.cells, each))
     return _sum(ctx, model.zones[0], forces)

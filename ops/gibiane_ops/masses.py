@@ -11,7 +11,7 @@ from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Operator, Refused, extend, operator
 from gibiane.values import CHPOINT, FLOTTANT, LISTMOTS, MAILLAGE, MCHAML, MMODEL, MOT, POINT, RIGIDITE
-from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels import assembly, integrals
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.topology import places_in
 from gibiane_ops.values.champs import DISCRET, ChPoint, MChaml
@@ -62,7 +62,7 @@ def _masses(ctx: Context, model: Modele, material: MChaml, lumped: bool) -> Rigi
         wanted = ("RHO", "SECT") if zone.bars else ("RHO",)
         density = properties(ctx, material, zone, wanted, "material", "a mass matrix needs RHO, and SECT for bars")
         of, x = shape(zone.shape), checked_corners(ctx, zone)
-        compute = assembly.lumped_mass if lumped else assembly.element_mass
+        compute = integrals.lumped_mass if lumped else integrals.element_mass
         with worded(ctx, at="model"):
             each = compute(of, x, density.prod(axis=-1), axisymmetric=zone.axisymmetric)
         blocks.append((places_in(nodes, zone.cells), each))

@@ -9,7 +9,7 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, MCHAML, MMODEL
-from gibiane_ops.kernels import assembly, invariants
+from gibiane_ops.kernels import assembly, elasticity, invariants
 from gibiane_ops.kernels.arrays import strain_tensor, stress_tensor
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
@@ -166,7 +166,7 @@ def _sigm(ctx: Context, model: Modele, material: MChaml, u: ChPoint, how: str | 
     for zone in solid_zones(ctx, model):
         law = elastic_law(ctx, material, zone, "material")
         strain = mechanics.strains(ctx, zone, u, quadratic=how == "QUAD")
-        zones.append(ChamZone(zone, zone.stresses, assembly.stresses(strain, law)))
+        zones.append(ChamZone(zone, zone.stresses, elasticity.stresses(strain, law)))
     return MChaml(zones, STRESS, "STRESSES")
 
 
@@ -195,7 +195,7 @@ def _elas(ctx: Context, model: Modele, field: MChaml, material: MChaml) -> MCham
     for zone in solid_zones(ctx, model):
         values = on_zone(ctx, field, zone, "field").values
         names = zone.stresses if target == STRESS else zone.strains
-        zones.append(ChamZone(zone, names, assembly.stresses(values, law(ctx, material, zone, "material"))))
+        zones.append(ChamZone(zone, names, elasticity.stresses(values, law(ctx, material, zone, "material"))))
     return MChaml(zones, target, field.support)
 
 

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels import assembly, elasticity
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic
 
@@ -31,7 +31,7 @@ def test_stiffness_of_cubes(bench, sizes, make_grid):
         D = isotropic(E, NU)
 
         def ours(points=points, cells=cells, D=D):
-            stiffness = assembly.element_stiffness(shape("CUB8"), points[cells], D)
+            stiffness = elasticity.element_stiffness(shape("CUB8"), points[cells], D)
             return assembly.assemble(len(points), 3, [(cells, stiffness)])
 
         size = f"{len(cells)} CUB8"

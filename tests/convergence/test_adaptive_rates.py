@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, geometry, recovery, topology
+from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, recovery, topology
 from gibiane_ops.kernels.adapt import hanging, hierarchy
 from gibiane_ops.kernels.adapt.orders import singular_orders
 from gibiane_ops.kernels.adapt.sizes import size_map
@@ -63,14 +63,14 @@ def solved(points, cells, name):
     """Pull the outer sides; return the displacement, the energy u.K.u and the number of free nodes."""
     of = shape(name)
     dim = of.dim
-    each = assembly.element_stiffness(of, points[cells], isotropic(1.0, 0.3, FAMILY[dim]))
+    each = elasticity.element_stiffness(of, points[cells], isotropic(1.0, 0.3, FAMILY[dim]))
     K = assembly.assemble(len(points), dim, [(cells, each)])
     F = np.zeros((len(points), dim))
     for facets in topology.boundary([(name, cells)]).values():
         for axis in range(2):
             on = facets.nodes[np.isclose(points[facets.nodes][:, :, axis], 1).all(axis=1)]
             pull = np.eye(dim)[axis]
-            load = assembly.distributed_load(shape(facets.name), points[on], pull)
+            load = integrals.distributed_load(shape(facets.name), points[on], pull)
             F += assembly.assemble_vector(len(points), dim, [(on, load)]).reshape(-1, dim)
     nodes, masters = hanging.hanging_nodes(points, [(name, cells)])
     T = sp.csr_array(sp.kron(hanging.relation_matrix(len(points), nodes, masters), sp.eye_array(dim)))
@@ -91,7 +91,7 @@ def solved(points, cells, name):
 def error_map(points, cells, name, U):
     of = shape(name)
     D, S = isotropic(1.0, 0.3, FAMILY[of.dim]), compliance(1.0, 0.3, FAMILY[of.dim])
-    block = StressBlock(of, cells, assembly.stresses(assembly.strains(of, points[cells], U[cells], of.gauss[0]), D))
+    block = StressBlock(of, cells, elasticity.stresses(elasticity.strains(of, points[cells], U[cells], of.gauss[0]), D))
     return np.sqrt(solid_error(points, block, recovery.mean_of_nodes(len(points), [block]), S).error)
 
 

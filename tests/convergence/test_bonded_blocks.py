@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels import assembly, elasticity, integrals
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic
@@ -40,8 +40,8 @@ def energy(n: int, merged: bool) -> float:
     top = cells[:, [4, 5, 6, 7]]
     top = top[np.all(points[top][:, :, 2] == 50.0, axis=1)]
     D = isotropic(210000.0, 0.3)
-    blocks_of = [(cells, assembly.element_stiffness(shape("CUB8"), points[cells], D))]
-    forces = assembly.pressure_load(shape("QUA4"), points[top], 3.125)
+    blocks_of = [(cells, elasticity.element_stiffness(shape("CUB8"), points[cells], D))]
+    forces = integrals.pressure_load(shape("QUA4"), points[top], 3.125)
     base = np.flatnonzero(points[:, 2] == -200.0)
     unknowns = (base[:, None] * 3 + np.arange(3)).ravel()
     if merged:

@@ -5,12 +5,14 @@ import pytest
 from two_blocks import blocks, fixing
 from two_grids import Boxes
 
-from gibiane_ops.kernels.assembly import assemble, assemble_vector, element_stiffness, pressure_load
+from gibiane_ops.kernels.assembly import assemble, assemble_vector
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.mortar import mortar_pairs
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.node_facet import node_facet_pairs
+from gibiane_ops.kernels.elasticity import element_stiffness
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.integrals import pressure_load
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.quadrature import line
 

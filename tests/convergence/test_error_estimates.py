@@ -7,22 +7,17 @@ import pytest
 import scipy.sparse as sp
 
 from gibiane_ops.kernels import recovery
-from gibiane_ops.kernels.assembly import (
-    assemble,
-    assemble_vector,
-    element_stiffness,
-    pressure_load,
-    strains,
-    stresses,
-)
+from gibiane_ops.kernels.assembly import assemble, assemble_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.newton import solve_coulomb, solve_tied
 from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.elasticity import element_stiffness, strains, stresses
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.combine import combine, facets_to_cells
 from gibiane_ops.kernels.estimate.contact import contact_error
 from gibiane_ops.kernels.estimate.zz import solid_error
+from gibiane_ops.kernels.integrals import pressure_load
 from gibiane_ops.kernels.materials import compliance, isotropic
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.topology import boundary

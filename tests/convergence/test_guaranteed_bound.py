@@ -14,12 +14,13 @@ import pytest
 import scipy.sparse as sp
 
 from gibiane import Session
-from gibiane_ops.kernels.assembly import assemble, element_stiffness, strains, stresses
+from gibiane_ops.kernels.assembly import assemble
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.elasticity import element_stiffness, strains, stresses
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stress
 from gibiane_ops.kernels.estimate.contact_bound import contact_tractions

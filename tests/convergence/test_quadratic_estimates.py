@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from gibiane_ops.kernels import assembly, geometry, recovery, topology
+from gibiane_ops.kernels import assembly, elasticity, geometry, recovery, topology
 from gibiane_ops.kernels.elements.table import quadratic, shape
 from gibiane_ops.kernels.estimate.zz import solid_error
 from gibiane_ops.kernels.materials import compliance, isotropic
@@ -86,7 +86,7 @@ def study(name, n, method):
     mode = "TRID" if dim == 3 else "DEFO"
     D, S = isotropic(E, NU, mode), compliance(E, NU, mode)
     X = points[cells]
-    stiffness = assembly.assemble(len(points), dim, [(cells, assembly.element_stiffness(of, X, D))]).tocsr()
+    stiffness = assembly.assemble(len(points), dim, [(cells, elasticity.element_stiffness(of, X, D))]).tocsr()
     xi, weights = of.mass_gauss
     density = geometry.measure_densities(of, X, xi) * weights
     loads = np.einsum("mq,qa,mqi->mai", density, of.N(xi), body_force(geometry.positions(of, X, xi)))
@@ -98,11 +98,11 @@ def study(name, n, method):
     U = exact(points)[0].ravel()
     U[~fixed] = spsolve(stiffness[~fixed][:, ~fixed].tocsc(), load[~fixed] - stiffness[~fixed][:, fixed] @ U[fixed])
     U = U.reshape(-1, dim)
-    stress = assembly.stresses(assembly.strains(of, X, U[cells], of.gauss[0]), D)
+    stress = elasticity.stresses(elasticity.strains(of, X, U[cells], of.gauss[0]), D)
     block = StressBlock(of, cells, stress)
     nodal = recovery.recover(points, [block], method).nodal
     estimate = np.sqrt(solid_error(points, block, nodal, S).error.sum())
-    raw = assembly.stresses(assembly.strains(of, X, U[cells], xi), D)
+    raw = elasticity.stresses(elasticity.strains(of, X, U[cells], xi), D)
     gap = raw - exact_stress(geometry.positions(of, X, xi), D)
     true = np.sqrt((density * np.einsum("mqc,cd,mqd->mq", gap, S, gap)).sum())
     return estimate, true

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, bars, geometry, quadrature, topology
+from gibiane_ops.kernels import assembly, bars, elasticity, geometry, quadrature, topology
 from gibiane_ops.kernels.arrays import strain_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
@@ -98,7 +98,7 @@ def errors(name: str, mode: str, n: int) -> tuple[float, float]:
     if axis:
         points = points + [1.0, 0.0]
     X = points[cells]
-    K = assembly.assemble(len(points), dim, [(cells, assembly.element_stiffness(each, X, D, axisymmetric=axis))])
+    K = assembly.assemble(len(points), dim, [(cells, elasticity.element_stiffness(each, X, D, axisymmetric=axis))])
     N = each.N(rule.points)
     places = geometry.positions(each, X, rule.points)
     u, strain, force = ring(places) if axis else wave(places, mode)
@@ -111,7 +111,7 @@ def errors(name: str, mode: str, n: int) -> tuple[float, float]:
     imposed = (ring(points[skin]) if axis else wave(points[skin], mode))[0]
     reduction = reduce_conditions(C, imposed.ravel())
     found = reduction.expand(factorize(reduction.matrix(K)).solve(reduction.load(K, F))).reshape(-1, dim)
-    gap = strain - assembly.strains(each, X, found[cells], rule.points, axisymmetric=axis)
+    gap = strain - elasticity.strains(each, X, found[cells], rule.points, axisymmetric=axis)
     energy = np.einsum("mqs,st,mqt,mq->", gap, D, gap, factor)
     distance = u - np.matmul(N, found[cells])
     return float(np.sqrt(energy)), float(np.sqrt(np.einsum("mqi,mqi,mq->", distance, distance, factor)))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, geometry, topology
+from gibiane_ops.kernels import assembly, elasticity, geometry, topology
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import SHAPES
@@ -59,7 +59,7 @@ def strain_energy(name: str, n: int) -> float:
     points, cells = l_shape(n, name)
     each = SHAPES[name]
     K = assembly.assemble(
-        len(points), 2, [(cells, assembly.element_stiffness(each, points[cells], isotropic(E, NU, "DEFO")))]
+        len(points), 2, [(cells, elasticity.element_stiffness(each, points[cells], isotropic(E, NU, "DEFO")))]
     )
     (facets,) = topology.boundary([(name, cells)]).values()
     outer = np.unique(facets.nodes[np.isclose(np.abs(points[facets.nodes]), 1).all(axis=1).any(axis=1)])

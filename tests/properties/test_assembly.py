@@ -6,7 +6,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gibiane_ops.kernels import assembly, geometry, topology
+from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, topology
 from gibiane_ops.kernels.arrays import component_of, strain_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
@@ -75,7 +75,7 @@ IN_MODES = [(name, mode) for name in NAMES for mode in (("TRID",) if SHAPES[name
 
 
 def stiffness(name: str, points: np.ndarray, cells: np.ndarray, D: np.ndarray | None = None) -> sp.csr_array:
-    Ke = assembly.element_stiffness(SHAPES[name], points[cells], law(name) if D is None else D)
+    Ke = elasticity.element_stiffness(SHAPES[name], points[cells], law(name) if D is None else D)
     return assembly.assemble(len(points), points.shape[1], [(cells, Ke)])
 
 
@@ -101,7 +101,7 @@ def test_patch(name: str, mode: str, seed: int) -> None:
     assert len(skin) < len(points)
     assert np.allclose(u, exact, atol=1e-12 * np.abs(exact).max())
     each = SHAPES[name]
-    stress = assembly.stresses(assembly.strains(each, points[cells], u[cells], each.gauss[0]), law(name, mode))
+    stress = elasticity.stresses(elasticity.strains(each, points[cells], u[cells], each.gauss[0]), law(name, mode))
     H = np.zeros((3, 3))
     H[:dim, :dim] = A
     constant = law(name, mode) @ strain_vector((H + H.T) / 2, stress.shape[-1])
@@ -122,7 +122,7 @@ def test_rigid_modes_and_nothing_else(name: str, mode: str) -> None:
 @pytest.mark.parametrize(("name", "mode"), IN_MODES)
 def test_single_elements_have_no_spurious_mode(name: str, mode: str) -> None:
     each = SHAPES[name]
-    values = np.linalg.eigvalsh(assembly.element_stiffness(each, each.ref_nodes[None], law(name, mode))[0])
+    values = np.linalg.eigvalsh(elasticity.element_stiffness(each, each.ref_nodes[None], law(name, mode))[0])
     assert np.count_nonzero(values < 1e-9 * values[-1]) == (6 if each.dim == 3 else 3)
 
 
@@ -142,7 +142,7 @@ def test_a_large_turn_has_no_strain_of_second_order(name: str) -> None:
     Q[0] *= np.sign(np.linalg.det(Q))
     F = np.eye(dim) + 0.3 * rng.standard_normal((dim, dim))
     u = points @ (Q @ F).T - points
-    found = assembly.strains(SHAPES[name], points[cells], u[cells], SHAPES[name].gauss[0], quadratic=True)
+    found = elasticity.strains(SHAPES[name], points[cells], u[cells], SHAPES[name].gauss[0], quadratic=True)
     E = (F.T @ F - np.eye(dim)) / 2
     expected = np.zeros(found.shape[2])
     for i in range(dim):
@@ -194,14 +194,14 @@ def test_bar_under_traction(name: str, mode: str) -> None:
     load = np.zeros(points.size)
     for face_name, facets in topology.boundary([(name, cells)]).items():
         end = facets.nodes[np.all(points[facets.nodes][:, :, 0] == 4, axis=1)]
-        forces = assembly.pressure_load(SHAPES[face_name], points[end], -s)
+        forces = integrals.pressure_load(SHAPES[face_name], points[end], -s)
         load += assembly.assemble_vector(len(points), dim, [(end, forces)])
     assert load.reshape(-1, dim).sum(axis=0)[0] == pytest.approx(s)
     reduction = reduce_conditions(fixed(supports, points.size))
     u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), reduction.load(K, load)))
     stretch = s / E * (1 - NU**2 if dim == 2 and mode == "DEFO" else 1.0)
     assert np.allclose(u.reshape(-1, dim)[:, 0], stretch * points[:, 0], atol=1e-11 * stretch)
-    stress = assembly.stresses(assembly.strains(each, points[cells], u.reshape(-1, dim)[cells], each.gauss[0]), D)
+    stress = elasticity.stresses(elasticity.strains(each, points[cells], u.reshape(-1, dim)[cells], each.gauss[0]), D)
     assert np.allclose(stress[..., 0], s, rtol=1e-11)
     r = reduction.reactions(K, u, load).reshape(-1, dim)
     assert r.sum(axis=0) == pytest.approx([-s, 0, 0][:dim], abs=1e-9)
@@ -214,7 +214,7 @@ def test_closed_boundary_under_pressure_is_in_balance(name: str) -> None:
     for face_name, facets in topology.boundary([(name, cells)]).items():
         X = points[facets.nodes]
         forces = np.zeros((*X.shape[:2], 3))
-        forces[..., : points.shape[1]] = assembly.pressure_load(SHAPES[face_name], X, 7.0)
+        forces[..., : points.shape[1]] = integrals.pressure_load(SHAPES[face_name], X, 7.0)
         arms = np.zeros_like(forces)
         arms[..., : points.shape[1]] = X
         total += forces.sum(axis=(0, 1))
@@ -246,13 +246,13 @@ def test_axisymmetric_patch(name: str, seed: int) -> None:
     exact = points * [a, b]
     skin = np.unique(np.concatenate([f.nodes.ravel() for f in topology.boundary([(name, cells)]).values()]))
     K = assembly.assemble(
-        len(points), 2, [(cells, assembly.element_stiffness(each, points[cells], D, axisymmetric=True))]
+        len(points), 2, [(cells, elasticity.element_stiffness(each, points[cells], D, axisymmetric=True))]
     )
     reduction = reduce_conditions(fixed((skin[:, None] * 2 + [0, 1]).ravel(), points.size), exact[skin].ravel())
     load = reduction.load(K, np.zeros(points.size))
     u = reduction.expand(np.linalg.solve(reduction.matrix(K).toarray(), load)).reshape(-1, 2)
     assert np.allclose(u, exact, atol=1e-12 * np.abs(exact).max())
-    strain = assembly.strains(each, points[cells], u[cells], each.gauss[0], axisymmetric=True)
+    strain = elasticity.strains(each, points[cells], u[cells], each.gauss[0], axisymmetric=True)
     assert np.allclose(strain, [a, b, a, 0], atol=1e-11)
 
 
@@ -261,15 +261,15 @@ def test_axisymmetric_rigid_mode_and_forces(name: str) -> None:
     """Only the translation along the axis is free; internal forces are the stiffness times the displacement."""
     points, cells = meridian(name, 4)
     each, D, X = SHAPES[name], isotropic(E, NU, "AXIS"), points[cells]
-    Ke = assembly.element_stiffness(each, X, D, axisymmetric=True)
+    Ke = elasticity.element_stiffness(each, X, D, axisymmetric=True)
     K = assembly.assemble(len(points), 2, [(cells, Ke)]).toarray()
     values, vectors = np.linalg.eigh(K)
     assert abs(values[0]) < 1e-12 * values[-1]
     assert values[1] > 1e-6 * values[-1]
     assert np.allclose(np.abs(vectors[:, 0].reshape(-1, 2)), [0, 1 / np.sqrt(len(points))], atol=1e-9)
     u = np.random.default_rng(6).standard_normal(points.shape)
-    stress = assembly.stresses(assembly.strains(each, X, u[cells], each.gauss[0], axisymmetric=True), D)
-    forces = assembly.internal_forces(each, X, stress, axisymmetric=True)
+    stress = elasticity.stresses(elasticity.strains(each, X, u[cells], each.gauss[0], axisymmetric=True), D)
+    forces = elasticity.internal_forces(each, X, stress, axisymmetric=True)
     expected = (Ke @ u[cells].reshape(len(cells), -1, 1)).reshape(forces.shape)
     assert np.allclose(forces, expected, atol=1e-9 * np.abs(expected).max())
 
@@ -281,23 +281,23 @@ def test_axisymmetric_pressure_and_volume(name: str) -> None:
     each = SHAPES[name]
     total = np.zeros(2)
     for face, facets in topology.boundary([(name, cells)]).items():
-        total += assembly.pressure_load(SHAPES[face], points[facets.nodes], 3.0, axisymmetric=True).sum(axis=(0, 1))
+        total += integrals.pressure_load(SHAPES[face], points[facets.nodes], 3.0, axisymmetric=True).sum(axis=(0, 1))
     assert abs(total[1]) < 1e-11
     points, cells = box(name, (3, 2))
     points = points + [1.0, 0.0]
     volume = np.pi * (4.0**2 - 1.0**2) * 2.0
     X = points[cells]
-    mass = assembly.element_mass(each, X, 2.0, axisymmetric=True)
+    mass = integrals.element_mass(each, X, 2.0, axisymmetric=True)
     assert mass.sum() == pytest.approx(2 * volume)
-    assert assembly.lumped_mass(each, X, 2.0, axisymmetric=True).sum() == pytest.approx(2 * volume)
-    weight = assembly.distributed_load(each, X, np.array([0.0, -1.0]), axisymmetric=True)
+    assert integrals.lumped_mass(each, X, 2.0, axisymmetric=True).sum() == pytest.approx(2 * volume)
+    weight = integrals.distributed_load(each, X, np.array([0.0, -1.0]), axisymmetric=True)
     assert weight.sum(axis=(0, 1)) == pytest.approx([0.0, -volume])
 
 
 def test_a_negative_radius_is_refused() -> None:
     points, cells = mesh("QUA4", 1)
     with pytest.raises(BadValue):
-        assembly.element_stiffness(
+        elasticity.element_stiffness(
             SHAPES["QUA4"], points[cells] - [1.0, 0.0], isotropic(E, NU, "AXIS"), axisymmetric=True
         )
 
@@ -305,7 +305,7 @@ def test_a_negative_radius_is_refused() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_lumped_masses_are_positive_and_whole(name: str) -> None:
     points, cells = mesh(name, 9)
-    lumped = assembly.lumped_mass(SHAPES[name], points[cells], 3.0)
+    lumped = integrals.lumped_mass(SHAPES[name], points[cells], 3.0)
     assert np.all(lumped > 0)
     assert np.allclose(lumped.sum(axis=1), 3.0 * geometry.measures(SHAPES[name], points[cells]))
 
@@ -323,6 +323,6 @@ def test_shares_of_a_uniform_pressure_on_quadratic_facets(name: str, shares: lis
     each = SHAPES[name]
     X = np.zeros((1, each.n_nodes, each.dim + 1))
     X[0, :, : each.dim] = each.ref_nodes
-    forces = assembly.pressure_load(each, X, 1.0)[0]
+    forces = integrals.pressure_load(each, X, 1.0)[0]
     normal = forces @ forces.sum(axis=0) / np.linalg.norm(forces.sum(axis=0))
     assert np.allclose(normal, np.array(shares) * geometry.measures(each, X)[0], atol=1e-14)

@@ -5,12 +5,14 @@ from functools import lru_cache
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels.assembly import assemble, assemble_vector, element_stiffness, pressure_load
+from gibiane_ops.kernels.assembly import assemble, assemble_vector
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.contact.report import OPEN, SLIP
+from gibiane_ops.kernels.elasticity import element_stiffness
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.integrals import pressure_load
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.topology import boundary
 

@@ -3,8 +3,10 @@
 import numpy as np
 from two_blocks import brick
 
-from gibiane_ops.kernels.assembly import assemble, element_mass, element_stiffness
+from gibiane_ops.kernels.assembly import assemble
+from gibiane_ops.kernels.elasticity import element_stiffness
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.integrals import element_mass
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.topology import boundary
 

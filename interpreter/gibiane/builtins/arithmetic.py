@@ -14,25 +14,14 @@ NUMBER = (ENTIER, FLOTTANT)
 A, B = Arg("a", NUMBER, "first number"), Arg("b", NUMBER, "second number")
 
 
-def _number_infix(
-    name: str,
-    summary: str,
-    example: str,
-    *,
-    gives: str = "ENTIER|FLOTTANT",
-    topic: str = "arithmetic",
-    notice: str = "",
-) -> Operator:
+def _number_infix(name: str, summary: str, example: str) -> Operator:
     return infix(
         name,
-        topic=topic,
+        topic="arithmetic",
         summary=summary,
         example=example,
-        notice=notice
-        or (
-            "Two ENTIER give an ENTIER, any other two numbers a FLOTTANT. There is no precedence: operations are done "
-            "from left to right, and parentheses change that."
-        ),
+        notice="Two ENTIER give an ENTIER, any other two numbers a FLOTTANT. There is no precedence: operations are "
+        "done from left to right, and parentheses change that.",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gibiane_ops.kernels import assembly, geometry
+from gibiane_ops.kernels import geometry, integrals
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.elements.shape import Shape
 
@@ -63,5 +63,5 @@ def scalar_load(shape: Shape, X: FloatArray, density: FloatArray, *, axisymmetri
     (m, n_nodes) float64
         ``int N_a density``.
     """
-    mass = assembly.element_mass(shape, X, axisymmetric=axisymmetric)
+    mass = integrals.element_mass(shape, X, axisymmetric=axisymmetric)
     return np.asarray(np.matmul(mass, density[..., None])[..., 0], np.float64)

@@ -49,10 +49,10 @@ def nodes_of(ctx: Context) -> NodeStore:
     return node_store(ctx)
 
 
-def new_point(ctx: Context, coords: FloatArray, density: float | None = None) -> Point:
-    """Make a point; its density is the current one unless given."""
+def new_point(ctx: Context, coords: FloatArray) -> Point:
+    """Make a point of the current density."""
     store = node_store(ctx)
-    return Point(store, int(store.add([coords], ctx.option("DENS") if density is None else density)[0]))
+    return Point(store, int(store.add([coords], ctx.option("DENS"))[0]))
 
 
 def new_mesh(
@@ -108,9 +108,9 @@ def line_nodes(ctx: Context, mesh: Maillage, at: str) -> IntArray:
     return chains.chain_nodes(segments)
 
 
-def line_between(ctx: Context, nodes: IntArray, sides: Mapping[str, Maillage] | None = None) -> Maillage:
+def line_between(ctx: Context, nodes: IntArray) -> Maillage:
     """Make the line that joins nodes in order."""
-    return new_mesh(ctx, [("SEG2", chains.segments_of(nodes))], sides)
+    return new_mesh(ctx, [("SEG2", chains.segments_of(nodes))])
 
 
 def reversed_mesh(mesh: Maillage) -> Maillage:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels import assembly, geometry, recovery
+from gibiane_ops.kernels import elasticity, geometry, integrals, recovery
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.kernels.topology import places_in, used_nodes
@@ -44,14 +44,14 @@ def unbalanced(
     for zone in zones:
         of, cells = shape(zone.shape), places_in(nodes, zone.cells)
         values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
-        inner = assembly.internal_forces(of, points[cells], values)
+        inner = elasticity.internal_forces(of, points[cells], values)
         scale = max(scale, float(np.abs(inner).max(initial=0.0)))
         np.add.at(force, cells, -inner)
         if volu is not None:
-            np.add.at(force, cells, assembly.distributed_load(of, points[cells], volu.coords[:dim]))
+            np.add.at(force, cells, integrals.distributed_load(of, points[cells], volu.coords[:dim]))
     for side in sides:
         places = np.searchsorted(nodes, side.facets.nodes)
-        np.add.at(force, places, np.matmul(assembly.face_mass(shape(side.facets.name), points[places]), side.traction))
+        np.add.at(force, places, np.matmul(integrals.face_mass(shape(side.facets.name), points[places]), side.traction))
     for where, values in contact:
         np.add.at(force, np.searchsorted(nodes, where), values)
     known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)

@@ -255,14 +255,14 @@ class SolvedContact:
 
 
 def solved_contacts(
-    ctx: Context, model: Modele, material: MChaml | None, u: ChPoint, reaction: ChPoint, at: str = "mc"
+    ctx: Context, model: Modele, material: MChaml | None, u: ChPoint, reaction: ChPoint
 ) -> list[SolvedContact]:
     """Gather the state of every contact zone of a model from a displacement and the contact forces (REAC)."""
     found, kind, store = [], family(ctx), node_store(ctx)
     if not model.contacts:
-        ctx.fail(26, "this model has no contact zone", at=at, hint="MODE G1 G2 'CONTACT' ... makes one")
+        ctx.fail(26, "this model has no contact zone", at="mc", hint="MODE G1 G2 'CONTACT' ... makes one")
     for zone in model.contacts:
-        pairs = zone_pairs(ctx, zone, at)
+        pairs = zone_pairs(ctx, zone, "mc")
         # forces of a node on a sharp edge are known together: it counts for the side that comes first
         first = np.unique(pairs.pairs[:, 0], return_index=True)[1]
         if len(first) < len(pairs.pairs):

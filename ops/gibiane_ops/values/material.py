@@ -53,9 +53,9 @@ def solid_zones(ctx: Context, model: Modele, at: str = "model") -> list[ModelZon
     return model.zones
 
 
-def field_zones(ctx: Context, model: Modele, at: str = "model") -> list[ModelZone]:
+def field_zones(ctx: Context, model: Modele) -> list[ModelZone]:
     """Return the zones of a model that carry element fields: solids, zones of heat, surfaces under pressure."""
-    return [*model.zones, *model.heated, *model.loads] or solid_zones(ctx, model, at)
+    return [*model.zones, *model.heated, *model.loads] or solid_zones(ctx, model)
 
 
 def on_zone(ctx: Context, field: MChaml, zone: ModelZone, at: str | None = None) -> ChamZone:

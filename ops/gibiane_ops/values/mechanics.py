@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels import assembly, bars, geometry
+from gibiane_ops.kernels import bars, elasticity, geometry
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.failures import worded
@@ -19,11 +19,11 @@ def corners(ctx: Context, zone: ModelZone) -> FloatArray:
     return np.asarray(node_store(ctx).coords[zone.cells][..., : zone.dim], np.float64)
 
 
-def checked_corners(ctx: Context, zone: ModelZone, at: str = "model") -> FloatArray:
+def checked_corners(ctx: Context, zone: ModelZone) -> FloatArray:
     """Return the coordinates of the nodes of the elements, once they are known to have positive jacobians."""
     x = corners(ctx, zone)
     if not zone.bars:
-        with worded(ctx, at=at):
+        with worded(ctx, at="model"):
             geometry.check_cells(shape(zone.shape), x)
     return x
 
@@ -34,7 +34,7 @@ def stiffness(ctx: Context, zone: ModelZone, material: MChaml) -> FloatArray:
     with worded(ctx, at="model"):
         if zone.bars:
             return bars.bar_stiffness(shape(zone.shape), corners(ctx, zone), law)
-        return assembly.element_stiffness(shape(zone.shape), corners(ctx, zone), law, axisymmetric=zone.axisymmetric)
+        return elasticity.element_stiffness(shape(zone.shape), corners(ctx, zone), law, axisymmetric=zone.axisymmetric)
 
 
 def strains(ctx: Context, zone: ModelZone, u: ChPoint, *, quadratic: bool = False) -> FloatArray:
@@ -58,7 +58,7 @@ def strains(ctx: Context, zone: ModelZone, u: ChPoint, *, quadratic: bool = Fals
         if zone.bars:
             return bars.bar_strains(of, x, nodal, xi, quadratic=quadratic)
         axis = zone.axisymmetric
-        return assembly.strains(of, x, nodal, xi, axisymmetric=axis, checked=True, quadratic=quadratic)
+        return elasticity.strains(of, x, nodal, xi, axisymmetric=axis, checked=True, quadratic=quadratic)
 
 
 def internal_forces(ctx: Context, zone: ModelZone, stress: FloatArray) -> FloatArray:
@@ -67,4 +67,4 @@ def internal_forces(ctx: Context, zone: ModelZone, stress: FloatArray) -> FloatA
     with worded(ctx, at="model"):
         if zone.bars:
             return bars.bar_forces(of, x, stress)
-        return assembly.internal_forces(of, x, stress, axisymmetric=zone.axisymmetric)
+        return elasticity.internal_forces(of, x, stress, axisymmetric=zone.axisymmetric)

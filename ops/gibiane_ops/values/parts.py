@@ -10,7 +10,7 @@ from gibiane_ops.values.maillage import Block, Maillage
 from gibiane_ops.values.modele import Modele, ModelZone
 
 
-def model_part(ctx: Context, model: Modele, mesh: Maillage, at: str = "mesh") -> Modele:
+def model_part(ctx: Context, model: Modele, mesh: Maillage) -> Modele:
     """Return a model on the elements of a mesh; error 21 when one is no element of the model.
 
     Elements of one type that belong to several zones of the model stay apart.
@@ -31,7 +31,7 @@ def model_part(ctx: Context, model: Modele, mesh: Maillage, at: str = "mesh") ->
             ctx.fail(
                 21,
                 "{count} {shape} of the mesh are not elements of the model",
-                at=at,
+                at="mesh",
                 count=len(block.cells) - found,
                 shape=block.shape,
                 hint="REDU wants elements of the model itself: ELEM chooses among them",

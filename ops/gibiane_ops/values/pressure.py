@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gibiane.registry import Context
-from gibiane_ops.kernels import assembly, topology
+from gibiane_ops.kernels import assembly, integrals, topology
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.values.champs import DISCRET, ChPoint, MChaml
@@ -38,7 +38,7 @@ def pressure_forces(ctx: Context, model: Modele, field: MChaml) -> ChPoint:
         nodal = moved(of, values.values, field.support, "NOEUD")[..., 0]
         x = store.coords[zone.cells][..., : zone.dim]
         with worded(ctx, at="model"):
-            blocks.append((zone.cells, assembly.pressure_load(of, x, nodal, axisymmetric=zone.axisymmetric)))
+            blocks.append((zone.cells, integrals.pressure_load(of, x, nodal, axisymmetric=zone.axisymmetric)))
     nodes = topology.used_nodes([cells for cells, _ in blocks])
     local = [(topology.places_in(nodes, cells), forces) for cells, forces in blocks]
     dim = zones[0].dim

@@ -6,7 +6,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from gibiane_ops.kernels import assembly, quadrature
+from gibiane_ops.kernels import assembly, elasticity, integrals, quadrature
 from gibiane_ops.kernels.arrays import strain_vector, stress_tensor
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotEquilibrated
@@ -70,8 +70,8 @@ class Scene:
         """Displacements and stresses, the unknowns `held` set to zero."""
         of, dim = shape(NAMES[self.dim]), self.dim
         x = self.points[self.cells]
-        K = assembly.assemble(len(self.points), dim, [(self.cells, assembly.element_stiffness(of, x, self.law))])
-        F = assembly.assemble_vector(len(self.points), dim, [(self.cells, assembly.distributed_load(of, x, body))])
+        K = assembly.assemble(len(self.points), dim, [(self.cells, elasticity.element_stiffness(of, x, self.law))])
+        F = assembly.assemble_vector(len(self.points), dim, [(self.cells, integrals.distributed_load(of, x, body))])
         F = F.reshape(-1, dim)
         mass = (np.eye(dim) + 1) / (dim * (dim + 1))
         given = np.einsum("kij,kaj->kai", np.eye(dim) - exterior.free, exterior.traction)
@@ -80,7 +80,7 @@ class Scene:
         u = np.zeros(held.size)
         u[free] = factorize(K.tocsr()[free][:, free]).solve(F.ravel()[free])
         u = u.reshape(-1, dim)
-        return u, assembly.stresses(assembly.strains(of, x, u[self.cells], of.gauss[0]), self.law)[:, 0]
+        return u, elasticity.stresses(elasticity.strains(of, x, u[self.cells], of.gauss[0]), self.law)[:, 0]
 
     def rigid(self) -> np.ndarray:
         """Unknowns whose values fix the rigid motions, without any reaction under balanced loads."""
@@ -365,10 +365,10 @@ def test_identity_on_bricks(dim):
     face = shape(skin.name)
     normal = facet_normals(face, points[skin.nodes])
     traction = np.einsum("kaij,kj->kai", tensor(points[skin.nodes]), normal)
-    K = assembly.assemble(len(points), dim, [(cells, assembly.element_stiffness(of, points[cells], law))])
-    F = assembly.assemble_vector(len(points), dim, [(cells, assembly.distributed_load(of, points[cells], body))])
+    K = assembly.assemble(len(points), dim, [(cells, elasticity.element_stiffness(of, points[cells], law))])
+    F = assembly.assemble_vector(len(points), dim, [(cells, integrals.distributed_load(of, points[cells], body))])
     F = F.reshape(-1, dim)
-    np.add.at(F, skin.nodes, np.matmul(assembly.face_mass(face, points[skin.nodes]), traction))
+    np.add.at(F, skin.nodes, np.matmul(integrals.face_mass(face, points[skin.nodes]), traction))
     # Rigid motions are fixed by corners; balanced loads leave no reaction there.
     held = np.zeros(points.shape, bool)
     held[0] = True
@@ -378,7 +378,7 @@ def test_identity_on_bricks(dim):
     free = np.flatnonzero(~held.ravel())
     u = np.zeros(held.size)
     u[free] = factorize(K.tocsr()[free][:, free]).solve(F.ravel()[free])
-    stress = assembly.stresses(assembly.strains(of, points[cells], u.reshape(-1, dim)[cells], of.gauss[0]), law)
+    stress = elasticity.stresses(elasticity.strains(of, points[cells], u.reshape(-1, dim)[cells], of.gauss[0]), law)
     nodal = moved(of, stress, "STRESSES", "NOEUD")
 
     corners, owner = cut(of.name, cells, np.arange(len(points)))

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from two_blocks import blocks
 
-from gibiane_ops.kernels.assembly import assemble, element_stiffness
+from gibiane_ops.kernels.assembly import assemble
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.correction import Stalled, solve_corrected, tied_holds
@@ -18,6 +18,7 @@ from gibiane_ops.kernels.contact.pairs import joined
 from gibiane_ops.kernels.contact.pardiso_schur import PardisoSchur
 from gibiane_ops.kernels.contact.strategy import plan, solve_on_bodies
 from gibiane_ops.kernels.contact.tresca import solve_tresca_sequence
+from gibiane_ops.kernels.elasticity import element_stiffness
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import ContactUnbalanced, NotConverged
 from gibiane_ops.kernels.materials import isotropic

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels.assembly import assemble, element_stiffness
+from gibiane_ops.kernels.assembly import assemble
 from gibiane_ops.kernels.constraints import reduce_conditions
 from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.facets import integrals, surface_of
@@ -13,6 +13,7 @@ from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.kernels.elasticity import element_stiffness
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import ContradictoryConditions, EmptyContact, TooLarge
 from gibiane_ops.kernels.materials import isotropic

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, geometry, topology
+from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, topology
 from gibiane_ops.kernels.adapt import bisection, hanging, hierarchy, octree
 from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
@@ -96,7 +96,7 @@ def random_octree(dim, rng, rounds=3, start=3):
 
 def stiffness(name, points, cells):
     dim = points.shape[1]
-    each = assembly.element_stiffness(shape(name), points[cells], isotropic(1.0, 0.3, FAMILY[dim]))
+    each = elasticity.element_stiffness(shape(name), points[cells], isotropic(1.0, 0.3, FAMILY[dim]))
     return assembly.assemble(len(points), dim, [(cells, each)])
 
 
@@ -198,7 +198,7 @@ def test_energy_never_decreases_when_elements_are_divided(dim):
         every = sp.csr_array(sp.kron(T, sp.eye_array(dim)))
         (facets,) = topology.boundary([(name, cells)]).values()
         top = facets.nodes[np.isclose(points[facets.nodes][:, :, -1], 1).all(axis=1)]
-        load = assembly.pressure_load(shape(facets.name), points[top], 1.0)
+        load = integrals.pressure_load(shape(facets.name), points[top], 1.0)
         F = every.T @ assembly.assemble_vector(len(points), dim, [(top, load)]).ravel()
         K = sp.csc_array(every.T @ stiffness(name, points, cells) @ every)
         own = np.setdiff1d(np.arange(len(points)), hanging.hanging_nodes(points, [(name, cells)])[0])
@@ -358,7 +358,7 @@ def test_patch_test_across_degrees_and_energy_grows_with_the_quadratic_zone(kind
         assert bool(len(nodes)) == (0 < limit < 1)
         T = sp.csr_array(sp.kron(relation_matrix(len(P), nodes, masters), sp.eye_array(dim)))
         D = isotropic(1.0, 0.3, FAMILY[dim])
-        K = assembly.assemble(len(P), dim, [(c, assembly.element_stiffness(shape(n), P[c], D)) for n, c in blocks])
+        K = assembly.assemble(len(P), dim, [(c, elasticity.element_stiffness(shape(n), P[c], D)) for n, c in blocks])
         own = np.setdiff1d(np.arange(len(P)), nodes)
         used = np.zeros(len(P), bool)
         for _, c in blocks:
@@ -370,7 +370,7 @@ def test_patch_test_across_degrees_and_energy_grows_with_the_quadratic_zone(kind
         for facets in topology.boundary(blocks).values():
             top = facets.nodes[np.isclose(P[facets.nodes][:, :, -1], 1).all(axis=1)]
             if len(top):
-                load = assembly.distributed_load(shape(facets.name), P[top], np.eye(dim)[0])
+                load = integrals.distributed_load(shape(facets.name), P[top], np.eye(dim)[0])
                 F += assembly.assemble_vector(len(P), dim, [(top, load)]).reshape(-1, dim)
         free = np.flatnonzero(np.repeat(used[own] & (P[own, -1] > 1e-12), dim))
         A, b = sp.csc_array(T.T @ K @ T)[free][:, free], (T.T @ F.ravel())[free]

@@ -5,7 +5,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import spsolve
 
-from gibiane_ops.kernels import assembly, topology
+from gibiane_ops.kernels import assembly, elasticity, integrals, topology
 from gibiane_ops.kernels.adapt import degrees, moving
 from gibiane_ops.kernels.arrays import stress_tensor
 from gibiane_ops.kernels.elements.table import shape
@@ -41,18 +41,18 @@ def solved(name, points, cells):
     dim = points.shape[1]
     D = isotropic(1.0, 0.3, FAMILY[dim])
     of = shape(name)
-    K = sp.csc_array(assembly.assemble(len(points), dim, [(cells, assembly.element_stiffness(of, points[cells], D))]))
+    K = sp.csc_array(assembly.assemble(len(points), dim, [(cells, elasticity.element_stiffness(of, points[cells], D))]))
     (facets,) = topology.boundary([(name, cells)]).values()
     top = facets.nodes[np.isclose(points[facets.nodes][:, :, -1], 1).all(axis=1)]
     pull = np.zeros(dim)
     pull[0], pull[-1] = 1.0, 0.4
-    load = assembly.distributed_load(shape(facets.name), points[top], pull)
+    load = integrals.distributed_load(shape(facets.name), points[top], pull)
     F = assembly.assemble_vector(len(points), dim, [(top, load)]).ravel()
     free = np.flatnonzero(np.repeat(points[:, -1] > 1e-12, dim))
     u = np.zeros(points.size)
     u[free] = spsolve(K[free][:, free], F[free])
     U = u.reshape(-1, dim)
-    stress = assembly.stresses(assembly.strains(of, points[cells], U[cells], of.gauss[0]), D)
+    stress = elasticity.stresses(elasticity.strains(of, points[cells], U[cells], of.gauss[0]), D)
     return U, stress, -0.5 * float(F @ u)
 
 
@@ -79,7 +79,7 @@ def test_uniform_stress_moves_nothing():
     points, cells = block("TET4", 3)
     D = isotropic(1.0, 0.3, "TRID")
     U = points @ np.array([[0.1, 0.02, 0.0], [0.0, -0.1, 0.03], [0.05, 0.0, 0.2]])
-    stress = assembly.stresses(assembly.strains(shape("TET4"), points[cells], U[cells], shape("TET4").gauss[0]), D)
+    stress = elasticity.stresses(elasticity.strains(shape("TET4"), points[cells], U[cells], shape("TET4").gauss[0]), D)
     each = moving.configurational_forces(shape("TET4"), points[cells], U[cells], stress_tensor(stress))
     G = np.zeros_like(points)
     np.add.at(G, cells, each)
@@ -100,7 +100,7 @@ def test_the_energy_never_rises(name):
         each = moving.configurational_forces(shape(name), points[cells], U[cells], tensor)
         G = np.zeros_like(points)
         np.add.at(G, cells, each)
-        inner = assembly.internal_forces(shape(name), points[cells], stress)
+        inner = elasticity.internal_forces(shape(name), points[cells], stress)
         own = [0.5 * np.abs((inner.reshape(len(cells), -1) * U[cells].reshape(len(cells), -1)).sum(axis=1))]
         free = moving.freedoms(points, moving.limits_of(blocks, [], dim))
         free[np.isclose(points[:, -1], 1)] = 0.0  # loaded

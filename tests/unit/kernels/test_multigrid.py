@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, multigrid
+from gibiane_ops.kernels import assembly, elasticity, multigrid
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.iterations import amg
 from gibiane_ops.kernels.materials import isotropic
@@ -21,7 +21,7 @@ def solid(n, dim=3, stretch=1.0):
     corners = (of.ref_nodes > 0).astype(int)
     cells = np.stack([number[tuple(slice(c, c + n) for c in corner)] for corner in corners], -1).reshape(-1, 2**dim)
     D = isotropic(1.0, 0.3) if dim == 3 else isotropic(1.0, 0.3)[:4, :4]
-    K = assembly.assemble(len(points), dim, [(cells, assembly.element_stiffness(of, points[cells], D))])
+    K = assembly.assemble(len(points), dim, [(cells, elasticity.element_stiffness(of, points[cells], D))])
     clamped = np.repeat(points[:, -1] == 0, dim)
     keep = sp.diags_array(np.where(clamped, 0.0, 1.0))
     A = sp.csr_array(keep @ K @ keep + sp.diags_array(np.where(clamped, K.diagonal(), 0.0)))

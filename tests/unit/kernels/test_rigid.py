@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels import assembly, elasticity
 from gibiane_ops.kernels.bars import bar_stiffness
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic
@@ -18,7 +18,7 @@ def cubes(n: int) -> tuple[sp.csr_array, np.ndarray]:
     """Stack n unit cubes along z, not tied; node 8 i + local, and one node that no cell uses."""
     points = np.vstack([CUBE + [0, 0, i] for i in range(n)] + [np.array([[9.0, 9, 9]])])
     cells = np.arange(8 * n).reshape(n, 8)
-    Ke = assembly.element_stiffness(shape("CUB8"), points[cells], isotropic(1.0, 0.3))
+    Ke = elasticity.element_stiffness(shape("CUB8"), points[cells], isotropic(1.0, 0.3))
     return assembly.assemble(8 * n + 1, 3, [(cells, Ke)]), points
 
 
@@ -124,7 +124,7 @@ def test_conditions_on_a_node_without_stiffness_hold_nothing() -> None:
 
 def test_plane_solid() -> None:
     square = shape("QUA4").ref_nodes
-    Ke = assembly.element_stiffness(shape("QUA4"), square[None], isotropic(1.0, 0.3, "DEFO"))
+    Ke = elasticity.element_stiffness(shape("QUA4"), square[None], isotropic(1.0, 0.3, "DEFO"))
     K = assembly.assemble(4, 2, [(np.array([[0, 1, 2, 3]]), Ke)])
     assert len(free_motions(K, square, sp.csr_array((0, 8)))) == 3
     pinned = rows(8, {0: 1.0}, {1: 1.0})

@@ -193,21 +193,20 @@ def _contour(cells: IntArray) -> IntArray:
     return np.asarray(parts[first[np.bincount(index, minlength=len(first)) == 1]], np.int64)
 
 
-def longest_step(points: FloatArray, blocks: Sequence[Block], move: FloatArray, start: float = 1.0) -> float:
+def longest_step(points: FloatArray, blocks: Sequence[Block], move: FloatArray) -> float:
     """Shorten a move until elements keep enough volume and simplices their angles.
 
     Parameters
     ----------
     points, move : (n, dim) float64, length
     blocks : sequence of (str, (m, n_nodes) int64)
-    start : float
 
     Returns
     -------
     float
-        The first of start, start/2, ... that is good; 0 when none of twenty is.
+        The first of 1, 1/2, 1/4 ... that is good; 0 when none of twenty is.
     """
-    share = start
+    share = 1.0
     for _ in range(20):
         if all(_good(name, points[cells], (points + share * move)[cells]) for name, cells in blocks):
             return share

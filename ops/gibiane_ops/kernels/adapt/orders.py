@@ -75,7 +75,6 @@ def singular_orders(
     measures: FloatArray,
     order: float | FloatArray,
     *,
-    singular: float = SINGULAR_ORDER,
     beta: float = 3.0,
 ) -> FloatArray:
     """Give each element its order of convergence, lower where the error peaks.
@@ -85,9 +84,7 @@ def singular_orders(
     n_points, blocks, error2, measures, beta
         See `singular_nodes`.
     order : float or (n_cells,) float64
-        Order away from singularities.
-    singular : float
-        Order of the elements that touch a singular node.
+        Order away from singularities; an element that touches a singular node has `SINGULAR_ORDER` at most.
 
     Returns
     -------
@@ -95,7 +92,7 @@ def singular_orders(
     """
     peak = singular_nodes(n_points, blocks, error2, measures, beta)
     touched = np.concatenate([peak[each].any(axis=1) for _, each in blocks])
-    return np.where(touched, np.minimum(singular, order), order)
+    return np.where(touched, np.minimum(SINGULAR_ORDER, order), order)
 
 
 def fitted_orders(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gibiane_ops.kernels import assembly, geometry
+from gibiane_ops.kernels import assembly, geometry, integrals
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.cone import norms, radial_projection
 from gibiane_ops.kernels.elements.table import shape
@@ -77,7 +77,7 @@ def densities(
     One factorisation of size k.
     """
     masses = [
-        (_local(nodes, cells), assembly.element_mass(shape(name), points[cells], axisymmetric=axisymmetric))
+        (_local(nodes, cells), integrals.element_mass(shape(name), points[cells], axisymmetric=axisymmetric))
         for name, cells in facets
     ]
     # A node without contact keeps a zero density: its row and column drop out.
@@ -203,7 +203,7 @@ def _work(fields: FloatArray, d: int) -> FloatArray:
 
 def _shares(points: FloatArray, facets: Sequence[Block], nodes: IntArray, nodal: FloatArray) -> list[FloatArray]:
     """Split nodal values between facets in proportion to the area that each brings to the node."""
-    areas = [assembly.face_mass(shape(name), points[cells]).sum(axis=2) for name, cells in facets]
+    areas = [integrals.face_mass(shape(name), points[cells]).sum(axis=2) for name, cells in facets]
     local = [_local(nodes, cells) for _, cells in facets]
     blocks = [(cells, area[:, :, None]) for cells, area in zip(local, areas, strict=True)]
     total = assembly.assemble_vector(len(nodes) + 1, 1, blocks)

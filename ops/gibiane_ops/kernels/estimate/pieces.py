@@ -8,7 +8,7 @@ from math import factorial
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, quadrature
+from gibiane_ops.kernels import assembly, elasticity, quadrature
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
@@ -164,7 +164,7 @@ def balanced_stress(
     X = mesh.points[cells]
     n = len(mesh.points)
     points = len(of.gauss[1])
-    inner = assembly.internal_forces(of, X, np.repeat(stress[:, None], points, axis=1))
+    inner = elasticity.internal_forces(of, X, np.repeat(stress[:, None], points, axis=1))
     body = np.repeat((exterior.body * mesh.volume[:, None] / (dim + 1))[:, None], dim + 1, axis=1)
     force = assembly.assemble_vector(n, dim, [(cells, body - inner)]).reshape(n, dim)
     edge = mesh.boundary
@@ -172,7 +172,7 @@ def balanced_stress(
     given = np.einsum("ab,kbi,k->kai", moments(dim), exterior.traction, area)
     np.add.at(force, mesh.nodes[edge], given)
     Q = sp.block_diag(list(np.eye(dim) - held), format="csr") if held.any() else sp.eye_array(n * dim, format="csr")
-    K = sp.csr_array(Q @ assembly.assemble(n, dim, [(cells, assembly.element_stiffness(of, X, law))]) @ Q)
+    K = sp.csr_array(Q @ assembly.assemble(n, dim, [(cells, elasticity.element_stiffness(of, X, law))]) @ Q)
     right = Q @ force.ravel()
     scale = float(K.diagonal().mean())
     lift = sp.csr_array(sp.eye_array(n * dim) - Q) * scale + sp.eye_array(n * dim) * (SHIFT * scale)
@@ -187,5 +187,5 @@ def balanced_stress(
         history.append(float(np.abs(left).max()) / largest)
     else:
         raise NotConverged(history, u.reshape(n, dim))
-    strain = assembly.strains(of, X, (Q @ u).reshape(n, dim)[cells], of.gauss[0])
-    return np.asarray(stress + assembly.stresses(strain, law)[:, 0], np.float64)
+    strain = elasticity.strains(of, X, (Q @ u).reshape(n, dim)[cells], of.gauss[0])
+    return np.asarray(stress + elasticity.stresses(strain, law)[:, 0], np.float64)

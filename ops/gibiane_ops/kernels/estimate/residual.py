@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gibiane_ops.kernels import assembly, geometry
+from gibiane_ops.kernels import geometry, integrals
 from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
@@ -165,5 +165,5 @@ def _aligned(values: FloatArray, nodes: IntArray, target: IntArray) -> FloatArra
 
 def _square(of: Shape, X: FloatArray, values: FloatArray) -> FloatArray:
     """Integrate the square of nodal vectors interpolated over each facet."""
-    mass = assembly.element_mass(of, X)
+    mass = integrals.element_mass(of, X)
     return np.asarray((np.matmul(mass, values) * values).sum(axis=(1, 2)), np.float64)

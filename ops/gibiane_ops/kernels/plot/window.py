@@ -69,7 +69,7 @@ def show_scene(
     scale = scale or Scale()
     bands = bands_of([layer for layer in layers if isinstance(layer, Surface)], scale)
     with vtk_image.quiet():
-        plotter: Any = pyvista.Plotter(window_size=list(SIZE), lighting="none", title=title or "Gibiane")
+        plotter: Any = pyvista.Plotter(window_size=list(SIZE), lighting="none", title="Gibiane")
         plotter.set_background("white")
         plotter.add_light(vtk_image.lamp())
         for layer in layers:
@@ -86,13 +86,12 @@ def show_scene(
         _run(plotter, seconds)
 
 
-def show_picture(path: Path, title: str = "", seconds: float | None = None) -> None:
+def show_picture(path: Path, seconds: float | None = None) -> None:
     """Show a .png file until its window is closed.
 
     Parameters
     ----------
     path : Path
-    title : str
     seconds : float, optional
         Close by itself after so long.
     """
@@ -101,7 +100,7 @@ def show_picture(path: Path, title: str = "", seconds: float | None = None) -> N
     with vtk_image.quiet():
         image = pyvista.read(path)
         width, height = image.dimensions[:2]
-        plotter: Any = pyvista.Plotter(window_size=[width, height], title=title or "Gibiane")
+        plotter: Any = pyvista.Plotter(window_size=[width, height], title="Gibiane")
         plotter.add_mesh(image, rgb=True, lighting=False, show_scalar_bar=False)
         plotter.enable_parallel_projection()
         plotter.view_xy()

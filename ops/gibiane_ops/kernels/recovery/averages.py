@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly
+from gibiane_ops.kernels import assembly, integrals
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import NotConverged
 from gibiane_ops.kernels.recovery.blocks import StressBlock, centre_values, extrapolate
@@ -79,7 +79,7 @@ def project(points: FloatArray, blocks: Sequence[StressBlock], *, lumped: bool =
     points : (n_points, dim) float64, length
     blocks : list of StressBlock
     lumped : bool
-        Replace the mass matrix by a diagonal one, see `assembly.lumped_mass`.
+        Replace the mass matrix by a diagonal one, see `integrals.lumped_mass`.
 
     Returns
     -------
@@ -126,8 +126,8 @@ def _mass(block: StressBlock, points: FloatArray, lumped: bool) -> FloatArray:
     """Return the matrices that weigh the stresses of the cells; the rows of linear shapes are summed up later."""
     X = points[block.cells]
     if lumped and block.shape.degree == 2:
-        return assembly.lumped_mass(block.shape, X)[:, :, None] * np.eye(block.shape.n_nodes)
-    return assembly.element_mass(block.shape, X)
+        return integrals.lumped_mass(block.shape, X)[:, :, None] * np.eye(block.shape.n_nodes)
+    return integrals.element_mass(block.shape, X)
 
 
 def _conjugate_gradients(A: sp.csr_matrix, b: FloatArray) -> FloatArray:
