@@ -23,12 +23,12 @@ $(BIN)/python:
 # The stamps are redone when pyproject.toml changes; the install is editable, so new source files are seen at once.
 $(VENV)/installed: pyproject.toml | $(BIN)/python
 	@echo "gibiane: installing into $(VENV)"
-	@$(BIN)/python -m pip install --quiet --editable ".[viz,repl,med,dask,test]"
+	@$(BIN)/python -m pip install --quiet --editable ".[viz,repl,med,dask,mmg,test]"
 	@touch $@
 
 $(VENV)/installed-dev: pyproject.toml | $(VENV)/installed
 	@echo "gibiane: installing the development tools into $(VENV)"
-	@$(BIN)/python -m pip install --quiet --editable ".[viz,repl,med,dask,test,dev]"
+	@$(BIN)/python -m pip install --quiet --editable ".[viz,repl,med,dask,mmg,test,dev]"
 	@touch $@ $(VENV)/installed
 
 venv: $(VENV)/installed

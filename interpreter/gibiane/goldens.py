@@ -2,7 +2,8 @@
 
 A comment line `* golden: rtol=1e-6 atol=1e-12 exit=8 args=N=2` at the top of a script sets how it is compared: numbers
 with the two tolerances (default: exactly), the exit code that it must give (default 0), objects defined before it
-starts (`args=N=2,M=3`). `slow` marks one that takes minutes, `helper` a script that is no golden itself.
+starts (`args=N=2,M=3`). `slow` marks one that takes minutes, `helper` a script that is no golden itself;
+`needs=package` skips it where an optional Python package is not installed.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 from gibiane.session import Session
@@ -52,6 +54,7 @@ class Golden:
     args: tuple[str, ...] = ()
     slow: bool = False
     helper: bool = False
+    needs: str = ""
 
     @property
     def expected(self) -> Path:
@@ -88,12 +91,14 @@ def read(script: Path) -> Golden:
                     settings[name] = int(value)
                 elif name == "args" and value:
                     settings[name] = tuple(value.split(","))
+                elif name == "needs" and value:
+                    settings[name] = value
                 elif word in ("slow", "helper"):
                     settings[word] = True
                 else:
                     raise ValueError
             except ValueError:
-                known = "rtol=x atol=x exit=n args=NAME=VALUE slow helper"
+                known = "rtol=x atol=x exit=n args=NAME=VALUE needs=package slow helper"
                 raise BadHeader(f"{script.name}: '{word}' is no setting of a golden script ({known})") from None
     return Golden(script, **settings)  # type: ignore[arg-type]
 
@@ -218,6 +223,9 @@ def main(folder: Path, *, accept: bool, write: Callable[[str], object]) -> int:
         try:
             golden = read(script)
             if golden.helper:
+                continue
+            if golden.needs and find_spec(golden.needs) is None:
+                write(f"SKIPPED {name}: the package {golden.needs} is not installed\n")
                 continue
             count += 1
             outcome = run(golden)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,9 @@ class GoldenItem(pytest.Item):
 
     def runtest(self) -> None:
         """Run the script and compare; with `--bless` write what differs and show it."""
+        needs = self.golden.needs
+        if needs and find_spec(needs) is None:
+            pytest.skip(f"SKIPPED: the package {needs} is not installed")
         outcome = goldens.run(self.golden)
         problem = goldens.difference(self.golden, outcome)
         if problem is not None and self.config.getoption("--bless") and goldens.bless(self.golden, outcome):

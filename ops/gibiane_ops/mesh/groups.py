@@ -97,7 +97,7 @@ class Groups:
                         37, "the pair {index} has no MAILLAGE at index {side}", at="grou", index=index, side=side
                     )
                 if id(face) not in values:
-                    name = values[id(face)] = f"pair {index} {side}"
+                    name = values[id(face)] = f"PAIRES . {index} . {side}"
                     self._add(name, name, face)
                 names.append(values[id(face)])
             self.pairs.append((names[0], names[1]))
@@ -129,7 +129,7 @@ class Groups:
             parts = [(new_mesh(self.ctx, [(kind, cells[high == which])]), which) for which in (False, True)]
             made[name] = join([finished(self.ctx, part, which) for part, which in parts])
         for name, index in self.keys.items():
-            if name.startswith("pair"):
+            if name.startswith("PAIRES . "):
                 continue
             group = made[name]
             table.set(index, Point(group.store, int(group.nodes[0])) if name in self.points else group)

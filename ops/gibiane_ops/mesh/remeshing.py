@@ -32,9 +32,9 @@ REMA = operator(
     topic="mesh",
     summary="new mesh of the same domain with other sizes",
     notice="`M2 = REMAILLER M1 size` meshes the domain of M1 (TET4 in space, TRI3 in the plane) again; size is a "
-    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse), or in a plane a metric "
-    "G11 G21 G22 of TAILLE 'METRIQUE': elements are then long where it says so "
-    "(such a mesh is not quite the same twice). Corners, plane faces and "
+    "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse), or a metric "
+    "G11 G21 G22 (in space G31 G32 G33 too, by Mmg: `pip install gibiane[mmg]`) of TAILLE 'METRIQUE': elements are then "
+    "long where it says so (in the plane such a mesh is not quite the same twice). Corners, plane faces and "
     "straight edges are kept exactly, curved faces follow the old facets. `M2 T2 = REMAILLER M1 size 'GROU' T1`: the "
     "MAILLAGE in the table T1 (parts of M1, of its boundary, of edges, points) are found again on M2 under the same "
     "indices. Index PAIRES of T1, a table of tables (1: face of the second body, 2: face of the first), names contact "
@@ -78,15 +78,6 @@ def _remesh(
         )
     store = nodes_of(ctx)
     nodes = g.nodes
-    if dim == 3 and isinstance(size, ChPoint) and {"G11", "G22"} & set(size.names):
-        # The mesher of gmsh (MMG3D) did not come back within a minute for 800 tetrahedra.
-        ctx.fail(
-            251,
-            "in space a mesh cannot follow sizes that depend on the direction (components {names})",
-            at="size",
-            names=" ".join(size.names),
-            hint="G = det(M)**(1/3) asks for as many elements without direction",
-        )
     metric = metric_at(ctx, size, nodes, dim)
     sizes = sizes_at(ctx, size, nodes) if metric is None else metric
     groups = Groups(ctx, grou if grou is not None else Table(), nodes)

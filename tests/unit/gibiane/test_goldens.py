@@ -57,6 +57,17 @@ def test_three_digit_exponents_are_numbers(tmp_path: Path) -> None:
     assert problem(golden) is None
 
 
+def test_a_script_without_its_package_is_skipped(tmp_path: Path) -> None:
+    assert write(tmp_path, "* golden: needs=no_such_package\nMESS 1 ;", "2\n").needs == "no_such_package"
+    write(tmp_path, "MESS 1 ;", "1\n", name="other")
+    said: list[str] = []
+    assert goldens.main(tmp_path, accept=False, write=said.append) == 0
+    assert said == [
+        "SKIPPED case.dgibi: the package no_such_package is not installed\n",
+        "1 golden scripts: 1 passed, 0 failed\n",
+    ]
+
+
 def test_exit_code_is_part_of_what_is_expected(tmp_path: Path) -> None:
     shown = "error[5]: ERREUR: a test of this script failed\n"
     assert "exit code 12; the header of the script says 0" in (problem(write(tmp_path, "ERRE 5 ;", shown)) or "")

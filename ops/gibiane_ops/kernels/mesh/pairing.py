@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import BadValue
 
@@ -38,7 +39,8 @@ def merged_nodes(
     Raises
     ------
     BadValue
-        A name that is no group of facets, nodes that do not lie at the same places, one solid on both sides.
+        A name that is no group of facets, nodes that do not lie at the same places, facets cut along other diagonals,
+        one solid on both sides.
     """
     from scipy.spatial import cKDTree
 
@@ -52,10 +54,17 @@ def merged_nodes(
         distance, nearest = cKDTree(points[b]).query(points[a])
         limit = PAIR_TOLERANCE * float(np.ptp(points, axis=0).max())
         if len(a) != len(b) or len(np.unique(nearest)) != len(a) or distance.max() > limit:
-            raise BadValue(f"pair {first}, {second}", float(distance.max()), "two faces with nodes at the same places")
+            raise BadValue(f"contact of {first} and {second}", float(distance.max()), "two faces with nodes at the same places")
+        partner = np.full(len(points), -1, np.int64)
+        partner[a] = b[nearest]
+        number, once = topology.group_by_nodes(np.vstack([groups[second], partner[groups[first]]]))
+        alone = len(once) - len(np.unique(number[: len(groups[second])]))
+        if len(groups[first]) != len(groups[second]) or alone:
+            told = f"{max(alone, 1)} facets without partner"
+            raise BadValue(f"contact of {first} and {second}", told, "two faces cut alike, along the same diagonals")
         owner = np.unique(solid[a])
         if len(owner) != 1 or owner[0] in solid[b]:
-            raise BadValue(f"pair {first}, {second}", "one solid on both sides", "faces of two different solids")
+            raise BadValue(f"contact of {first} and {second}", "one solid on both sides", "faces of two different solids")
         merged[a] = merged[b[nearest]]
         owners.append((int(owner[0]), int(solid[b[0]])))
     while (merged[merged] != merged).any():  # a node in several contacts

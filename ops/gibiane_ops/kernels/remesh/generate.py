@@ -84,15 +84,25 @@ def generate(skeleton: Skeleton, cells: IntArray, sizes: FloatArray) -> RawMesh:
         return _read(gmsh, skeleton)
 
 
-def _corner_nodes(skeleton: Skeleton) -> IntArray:
-    """List the ends of the chains."""
+def corner_nodes(skeleton: Skeleton) -> IntArray:
+    """List the ends of the chains.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+
+    Returns
+    -------
+    (k,) int64
+        Increasing.
+    """
     return np.unique([node for chain in skeleton.chains for node in (chain[0], chain[-1])])
 
 
 def _plane_entities(gmsh: Any, skeleton: Skeleton) -> None:
     """Describe plane patches by their straight limits; tags are numbers of the skeleton plus one."""
     geo = gmsh.model.geo
-    for node in _corner_nodes(skeleton):
+    for node in corner_nodes(skeleton):
         geo.addPoint(*skeleton.points[node], 0, int(node) + 1)
     for k, chain in enumerate(skeleton.chains):
         geo.addLine(int(chain[0]) + 1, int(chain[-1]) + 1, k + 1)
@@ -152,7 +162,7 @@ def _discrete_entities(gmsh: Any, skeleton: Skeleton) -> None:
         model.mesh.addNodes(dim, tag, nodes + 1, points[nodes].ravel())
         model.mesh.addElementsByType(tag, ELEMENT_TYPES[dim], [], (elements + 1).ravel())
 
-    for node in _corner_nodes(skeleton):
+    for node in corner_nodes(skeleton):
         add(0, int(node) + 1, [], np.array([[node]]))
     for k, chain in enumerate(skeleton.chains):
         add(1, k + 1, [int(chain[0]) + 1, int(chain[-1]) + 1], np.stack([chain[:-1], chain[1:]], axis=1))
@@ -198,14 +208,14 @@ def _read(gmsh: Any, skeleton: Skeleton) -> RawMesh:
         raise MeshingFailed(f"{len(empty)} regions stayed empty")
     lines = [read_simplices(gmsh, 1, k + 1, position) for k in range(len(skeleton.chains))]
     corners = {}
-    for node in _corner_nodes(skeleton):
+    for node in corner_nodes(skeleton):
         corners[int(node)] = int(position[int(gmsh.model.mesh.getNodes(0, int(node) + 1)[0][0])])
         points[corners[int(node)]] = skeleton.points[node]
     faces = lines
     if dim == 3:
         faces = [read_simplices(gmsh, 2, p + 1, position) for p in range(len(skeleton.borders))]
         if not skeleton.polyhedral:
-            _flatten(points, faces, lines, skeleton)
+            flatten(points, faces, lines, skeleton)
     return RawMesh(
         points,
         np.vstack(cells),
@@ -218,10 +228,21 @@ def _read(gmsh: Any, skeleton: Skeleton) -> RawMesh:
     )
 
 
-def _flatten(points: FloatArray, faces: list[IntArray], lines: list[IntArray], skeleton: Skeleton) -> None:
-    """Move nodes of plane patches into their plane, and nodes of straight chains onto their line, in place."""
+def flatten(points: FloatArray, faces: list[IntArray], lines: list[IntArray], skeleton: Skeleton) -> None:
+    """Move nodes of plane patches into their plane, and nodes of straight chains onto their line, in place.
+
+    Parameters
+    ----------
+    points : (n, 3) float64, length
+        Changed.
+    faces : list of (k, 3) int64
+        New triangles of each patch.
+    lines : list of (l, 2) int64
+        New segments of each chain.
+    skeleton : Skeleton
+    """
     on_chain = np.unique(np.vstack(lines)) if lines else np.zeros(0, np.int64)
-    for p in np.flatnonzero(skeleton.plane):
+    for p in np.flatnonzero(skeleton.plane) if faces else ():
         nodes = np.setdiff1d(faces[p], on_chain)
         old = skeleton.points[np.unique(skeleton.triangles[skeleton.patch == p])]
         centre = old.mean(axis=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -16,10 +16,14 @@ from gibiane_ops.kernels.errors import BadValue, MeshingFailed
 from gibiane_ops.kernels.mesh import pairing
 from gibiane_ops.kernels.remesh.carry import Contact, OldMesh, carry
 from gibiane_ops.kernels.remesh.generate import RawMesh, generate
+from gibiane_ops.kernels.remesh.mmg import generate_stretched, mmg_is_installed
 from gibiane_ops.kernels.remesh.skeleton import CELL, Skeleton, build_skeleton, membership, regions
 
 FIRST_GUESS = 0.87
 """Ratio of the sizes given to the mesher to those asked, at the first trial; the next trials measure it."""
+
+FIRST_GUESS_MMG = 1.15
+"""The same for Mmg, which stops dividing where edges are up to 1.4 times as long as wanted, but rarely joins them."""
 
 AIM, LOWEST = 0.98, 0.95
 """The number of elements aimed at, and the least accepted, as shares of the number asked (never exceeded)."""
@@ -71,7 +75,7 @@ def remesh(
     points : (n_points, dim) float64, length
     cells : (m, dim + 1) int64
         TRI3 in a plane or TET4 in space; all the solids together.
-    sizes : float or (n_points,) float64, length, or in a plane (n_points, 2, 2) float64, length^-2
+    sizes : float or (n_points,) float64, length, or (n_points, dim, dim) float64, length^-2
         Edge of the regular simplex wanted, one value or one per node of the old mesh; or the metric in which the edges
         are 1 long.
     groups : dict of str to (k, c) int64, optional
@@ -97,7 +101,7 @@ def remesh(
     MeshingFailed
         The mesher failed, or its mesh does not fill the old domain.
     MissingPackage, MissingSystemLibrary
-        When gmsh cannot be used.
+        When gmsh cannot be used, or for a metric in space Mmg.
 
     Notes
     -----
@@ -148,7 +152,15 @@ def remesh(
         flat = given.reshape(len(points), -1)
         mean = np.stack([_group_mean(flat[:, k], merged, used) for k in range(dim * dim)], axis=1)
         field = mean.reshape(given.shape)
-    raw, counts = _mesh_to_count(skeleton, new_cells, field, wanted)
+
+    by_mmg = given.ndim == 3 and (dim == 3 or mmg_is_installed())
+
+    def mesher(sizes: FloatArray) -> RawMesh:
+        if by_mmg:
+            return generate_stretched(skeleton, new_cells, region, sizes, angle)
+        return generate(skeleton, new_cells, sizes)
+
+    raw, counts = _mesh_to_count(mesher, field, wanted, dim, FIRST_GUESS_MMG if by_mmg else FIRST_GUESS)
     volumes = geometry.measures(shape(CELL[dim]), raw.points[raw.cells][:, :, :dim])
     _check_measures(skeleton, np.abs(geometry.measures(shape(CELL[dim]), points[cells])), np.abs(volumes))
     turned = np.where((volumes < 0)[:, None], raw.cells[:, [1, 0, *range(2, dim + 1)]], raw.cells)
@@ -176,21 +188,23 @@ def _group_mean(values: FloatArray, group: IntArray, members: IntArray) -> Float
     return np.asarray((total / np.maximum(number, 1))[group], np.float64)
 
 
-def _mesh_to_count(skeleton: Skeleton, cells: IntArray, sizes: FloatArray, wanted: float) -> tuple[RawMesh, list[int]]:
+def _mesh_to_count(
+    mesher: Callable[[FloatArray], RawMesh], sizes: FloatArray, wanted: float, dim: int, guess: float
+) -> tuple[RawMesh, list[int]]:
     """Mesh, count and correct until the number of elements is in the accepted range; keep the best trial."""
     if not np.isfinite(wanted):
-        raw = generate(skeleton, cells, sizes)
+        raw = mesher(sizes)
         return raw, [len(raw.cells)]
-    factors, counts = [FIRST_GUESS], [0]
+    factors, counts = [guess], [0]
     best: RawMesh | None = None
     for trial in range(TRIALS):
-        raw = generate(skeleton, cells, _scaled(sizes, factors[-1]))
+        raw = mesher(_scaled(sizes, factors[-1]))
         counts[-1] = len(raw.cells)
         if best is None or _rank(counts[-1], wanted) < _rank(len(best.cells), wanted):
             best = raw
         if LOWEST * wanted <= counts[-1] <= wanted or trial == TRIALS - 1:
             break
-        power = _measured_power(factors, counts, skeleton.dim)
+        power = _measured_power(factors, counts, dim)
         factors.append(factors[-1] * (counts[-1] / (AIM * wanted)) ** (1 / power))
         counts.append(0)
     assert best is not None

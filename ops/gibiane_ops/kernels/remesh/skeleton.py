@@ -254,9 +254,15 @@ def _folded(points: FloatArray, triangles: IntArray, pairs: IntArray) -> BoolArr
     a, b = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
     shared = (a[:, :, None] == b[:, None, :]).any(axis=2)
     middle = (points[a] * shared[:, :, None]).sum(axis=1) / 2
-    toward = points[a].mean(axis=1) - middle
-    other = points[b].mean(axis=1) - middle
-    return np.asarray((toward * other).sum(axis=1) > 0, np.bool_)
+    # A long triangle may lean far along the edge: only what stands across it tells the side.
+    edge = 2 * (middle - points[a][np.arange(len(a)), shared.argmax(axis=1)])
+    edge /= np.linalg.norm(edge, axis=1, keepdims=True)
+
+    def across(triangle: IntArray) -> FloatArray:
+        toward = points[triangle].mean(axis=1) - middle
+        return np.asarray(toward - (toward * edge).sum(axis=1, keepdims=True) * edge, np.float64)
+
+    return np.asarray((across(a) * across(b)).sum(axis=1) > 0, np.bool_)
 
 
 def _patch_limits(triangles: IntArray, patch: IntArray) -> tuple[IntArray, IntArray]:
