@@ -33,9 +33,9 @@ REMA = operator(
     summary="new mesh of the same domain with other sizes",
     notice="`M2 = REMAILLER M1 size` meshes the domain of M1 (TET4 in space, TRI3 in the plane) again; size is a "
     "FLOTTANT or a CHPOINT on M1, of component SCAL (edge length) or G (its square inverse), or a metric "
-    "G11 G21 G22 (in space G31 G32 G33 too, by Mmg: `pip install gibiane[mmg]`) of TAILLE 'METRIQUE': elements are then "
-    "long where it says so (in the plane such a mesh is not quite the same twice). Corners, plane faces and "
-    "straight edges are kept exactly, curved faces follow the old facets. `M2 T2 = REMAILLER M1 size 'GROU' T1`: the "
+    "G11 G21 G22 (in space G31 G32 G33 too) of TAILLE 'METRIQUE': elements are then long where it says so; Mmg makes "
+    "them (`pip install gibiane[mmg]`; a plane is meshed without it too, but not quite the same twice). Corners, plane "
+    "faces and straight edges are kept exactly, curved faces follow the old facets. `M2 T2 = REMAILLER M1 size 'GROU' T1`: the "
     "MAILLAGE in the table T1 (parts of M1, of its boundary, of edges, points) are found again on M2 under the same "
     "indices. Index PAIRES of T1, a table of tables (1: face of the second body, 2: face of the first), names contact "
     "faces that are meshed once and duplicated, so that their nodes still pair. With 'SOUC' a failure is a warning "

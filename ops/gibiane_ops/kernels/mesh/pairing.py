@@ -54,7 +54,9 @@ def merged_nodes(
         distance, nearest = cKDTree(points[b]).query(points[a])
         limit = PAIR_TOLERANCE * float(np.ptp(points, axis=0).max())
         if len(a) != len(b) or len(np.unique(nearest)) != len(a) or distance.max() > limit:
-            raise BadValue(f"contact of {first} and {second}", float(distance.max()), "two faces with nodes at the same places")
+            raise BadValue(
+                f"contact of {first} and {second}", float(distance.max()), "two faces with nodes at the same places"
+            )
         partner = np.full(len(points), -1, np.int64)
         partner[a] = b[nearest]
         number, once = topology.group_by_nodes(np.vstack([groups[second], partner[groups[first]]]))
@@ -64,7 +66,9 @@ def merged_nodes(
             raise BadValue(f"contact of {first} and {second}", told, "two faces cut alike, along the same diagonals")
         owner = np.unique(solid[a])
         if len(owner) != 1 or owner[0] in solid[b]:
-            raise BadValue(f"contact of {first} and {second}", "one solid on both sides", "faces of two different solids")
+            raise BadValue(
+                f"contact of {first} and {second}", "one solid on both sides", "faces of two different solids"
+            )
         merged[a] = merged[b[nearest]]
         owners.append((int(owner[0]), int(solid[b[0]])))
     while (merged[merged] != merged).any():  # a node in several contacts

@@ -1,4 +1,4 @@
-"""From a skeleton and a field of metrics to a raw mesh, through Mmg: the old mesh is changed until its edges are 1 long."""
+"""From a skeleton and a field of metrics to a raw mesh, by Mmg, which changes the old mesh."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def generate_stretched(
 
     Notes
     -----
-    Cells, facets of the patches and segments of the chains carry their numbers as references of Mmg, which keeps what has
-    one reference apart from what has another; corners are required nodes. The growth of the sizes is that of the
-    metric. Mmg has no random numbers: the same input gives the same mesh.
+    Cells, facets of the patches and segments of the chains carry their numbers as references of Mmg, which keeps what
+    has one reference apart from what has another; corners are required nodes. The growth of the sizes is that of the
+    metric. The same input gives the same mesh.
 
     Source
     ------
