@@ -248,7 +248,8 @@ VALE = operator(
     terminal=True,
     notice="Reads an option: what OPTI set, else what holds without it (an error when nothing does: DIME comes before "
     "MODE). MODE is one word, PLANCONT or TRID; `VALE 'MODE' 'FOUR'` the harmonic. LANG is the language "
-    "of listings, `VALE 'LANG' 'DIRE'` that of messages (both what OPTI or --lang set, else FRAN and ANGL). PREC, PETI and GRAN are the "
+    "of listings, `VALE 'LANG' 'DIRE'` that of messages (both what OPTI or --lang set, else FRAN and ANGL). "
+    "PREC, PETI and GRAN are the "
     "precision, the smallest and the largest FLOTTANT. 'SOUC' is the number of the last warning, 'ERMA' the highest "
     "error level so far, 'EXEC' says whether commands of the system are allowed. What VALE gives, OPTI takes back.",
     example="OPTI DIME 2 ; MESS (VALE DIME) ;",
