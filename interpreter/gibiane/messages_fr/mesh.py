@@ -78,8 +78,6 @@ MESH = {
     "the field of sizes has no value at {count} of {total} nodes": "le champ de tailles n'a pas de valeur à {count} des {total} noeuds",
     "it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field": "il doit couvrir tout le maillage : MANU 'CHPO' ou TAILLE font un tel champ",
     "a field of sizes has the component SCAL (edge length) or G (its square inverse), not {names}": "un champ de tailles a la composante SCAL (longueur d'arête) ou G (son inverse au carré), non {names}",
-    "in space a mesh cannot follow sizes that depend on the direction (components {names})": "dans l'espace un maillage ne peut pas suivre des tailles selon la direction (composantes {names})",
-    "G = det(M)**(1/3) asks for as many elements without direction": "G = det(M)**(1/3) demande autant d'éléments sans direction",
     "{count} middle nodes of quadratic elements stand on sides of linear ones, and nothing ties them: the displacement tears there, and the energy is wrong; the first is at ({place})": "{count} noeuds milieux d'éléments quadratiques sont sur des côtés d'éléments linéaires, et rien ne les lie : le déplacement s'y déchire, et l'énergie est fausse ; le premier est en ({place})",
     "RESO (K ET (RELA MODL)) F ties them, MODL the model of all elements": "RESO (K ET (RELA MODL)) F les lie, MODL le modèle de tous les éléments",
     "{count} elements of the new mesh are nearly flat: {which}; the worst, of quality {least}, is at ({place})": "{count} éléments du nouveau maillage sont presque plats : {which} ; le pire, de qualité {least}, est en ({place})",
