@@ -1,5 +1,6 @@
 """Studies on several processes: a worker that is killed, a run that is interrupted, a cluster."""
 
+import io
 import os
 import signal
 import subprocess
@@ -8,6 +9,9 @@ import time
 from pathlib import Path
 
 import pytest
+
+from gibiane.session import Session
+from gibiane_ops.assistants import operator, study
 
 STUDY = """\
 DEBP CAS X*FLOTTANT ;
@@ -144,3 +148,19 @@ def test_without_the_package_the_message_says_how_to_get_it(tmp_path: Path) -> N
     _, err = process.communicate(timeout=60)
     assert process.returncode == 8
     assert "gibiane[dask]" in err
+
+
+def test_a_case_without_memory_beside_others_is_run_again_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def local(package, numbers, count, make_session):
+        for number in numbers:
+            if number == 1:
+                yield number, study.Answer(None, "error[G414]\n", 2, operator.NO_ROOM, "too little memory", 0.1)
+            else:
+                yield number, study.run_case(package, number, make_session)
+
+    monkeypatch.setattr(operator.workers, "local", local)
+    session = Session(out=io.StringIO(), err=io.StringIO())
+    text = "OPTI ASSI 2 ; " + STUDY.format(keep="").replace("500000", "5")
+    assert session.run_text(text) == 0, session.err.getvalue()
+    assert ANSWER in session.out.getvalue()
+    assert "G414" not in session.out.getvalue()
