@@ -31,8 +31,8 @@ ASSI = operator(
     "tables of subtype ESCLAVE among its operands, which must have the same indices; each result is such a table. With "
     "OPTI ASSI n, or gibiane --workers n, the cases run on n processes of this machine; with gibiane --dask "
     "tcp://host:port on a Dask cluster (package distributed; gibiane must be installed there); otherwise one after the "
-    "other here. The results are the same. A worker that dies loses nothing: its case is run again; one that finds too little memory beside the others of this "
-    "machine is run again when they are done. A case that fails "
+    "other here. The results are the same. A worker that dies loses nothing: its case is run again; one that finds too "
+    "little memory beside the others of this machine is run again when they are done. A case that fails "
     "stops the others no more than itself; the error names it when all are done.\n"
     "A case sees the procedures that it calls and the objects that these name, and the options; what it assigns "
     "is gone, and tables that it changes are copies. Meshes that come back have nodes of their own. Pictures belong "
@@ -173,7 +173,7 @@ def _spread(
     texts: dict[int, str] = {}
     following = iter(sorted(missing))
     awaited = next(following, None)
-    beside = 0 < _workers(ctx) and not session.options.get("DASK")
+    beside = _workers(ctx) > 0 and not session.options.get("DASK")
     postponed: list[int] = []
 
     def take(number: int, answer: Answer) -> None:
