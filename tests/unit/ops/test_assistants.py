@@ -114,7 +114,7 @@ def test_a_killed_worker_of_a_cluster_loses_no_case(
     )
     monkeypatch.setenv("PYTHONPATH", ENVIRONMENT["PYTHONPATH"])
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as cluster:
         pids = {nanny.worker_address: nanny.pid for nanny in cluster.workers.values()}
         process = _run(tmp_path, "--dask", cluster.scheduler_address)
