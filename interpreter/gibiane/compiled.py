@@ -30,13 +30,31 @@ class Fallback(Exception):
     """
 
 
+def _beyond() -> Any:
+    """Leave a result that is not finite to the queue machine, which refuses it or tells where it comes from."""
+    raise FALLBACK
+
+
+# A finite number less itself is 0; infinity less itself is no number.
+def _sum(a: Any, b: Any) -> Any:
+    return value if (value := a + b) - value == 0 else _beyond()
+
+
+def _difference(a: Any, b: Any) -> Any:
+    return value if (value := a - b) - value == 0 else _beyond()
+
+
+def _product(a: Any, b: Any) -> Any:
+    return value if (value := a * b) - value == 0 else _beyond()
+
+
 def _quotient(a: Any, b: Any) -> Any:
     if b == 0:
         raise Fallback
     if type(a) is int and type(b) is int:
         q = abs(a) // abs(b)
         return q if (a >= 0) == (b >= 0) else -q
-    return a / b
+    return value if (value := a / b) - value == 0 else _beyond()
 
 
 def _power(a: Any, b: Any) -> Any:
@@ -46,7 +64,7 @@ def _power(a: Any, b: Any) -> Any:
 
 
 NUMERIC: dict[str, Callable[[Any, Any], Any]] = {
-    "+": py.add, "-": py.sub, "*": py.mul, "/": _quotient, "**": _power,
+    "+": _sum, "-": _difference, "*": _product, "/": _quotient, "**": _power,
 }  # fmt: skip
 COMPARE: dict[str, Callable[[Any, Any], bool]] = {"<": py.lt, ">": py.gt, "<EG": py.le, ">EG": py.ge}
 
@@ -320,16 +338,16 @@ def _binary(symbol: str, left: Fetch, right: Fetch, right_nodes: Sequence[Node])
     """Return the closure of one operation; the common ones are written out, which saves a call."""
     constant = right_nodes[0].value if len(right_nodes) == 1 and isinstance(right_nodes[0], Literal) else None
     if symbol == "+":
-        return (
-            (lambda frame: left(frame) + right(frame)) if constant is None else (lambda frame: left(frame) + constant)
-        )
+        if constant is None:
+            return lambda frame: value if (value := left(frame) + right(frame)) - value == 0 else _beyond()
+        return lambda frame: value if (value := left(frame) + constant) - value == 0 else _beyond()
     if symbol == "-":
-        return (
-            (lambda frame: left(frame) - right(frame)) if constant is None else (lambda frame: left(frame) - constant)
-        )
+        if constant is None:
+            return lambda frame: value if (value := left(frame) - right(frame)) - value == 0 else _beyond()
+        return lambda frame: value if (value := left(frame) - constant) - value == 0 else _beyond()
     if symbol == "*":
-        return (
-            (lambda frame: left(frame) * right(frame)) if constant is None else (lambda frame: left(frame) * constant)
-        )
+        if constant is None:
+            return lambda frame: value if (value := left(frame) * right(frame)) - value == 0 else _beyond()
+        return lambda frame: value if (value := left(frame) * constant) - value == 0 else _beyond()
     operate = NUMERIC[symbol]
     return lambda frame: operate(left(frame), right(frame))

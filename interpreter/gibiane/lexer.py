@@ -6,6 +6,7 @@ between tokens (and inside a string over several lines); a line that starts with
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 
@@ -162,7 +163,14 @@ def _number(source: SourceText, errors: dict[int, Diagnostic], start: int, end: 
             most=MOST_DIGITS,
         )
         return Token("NUMBER", 0, start, end)
-    return Token("NUMBER", number_value(source.text[start:end]), start, end)
+    text = source.text[start:end]
+    value = number_value(text)
+    if value in (math.inf, -math.inf):
+        errors[start] = make(
+            26, "the number {number} is too large for a FLOTTANT", number=text, span=Span(source, start, end)
+        )
+        value = 0.0
+    return Token("NUMBER", value, start, end)
 
 
 def _hint_for(char: str) -> str:

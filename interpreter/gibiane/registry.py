@@ -25,6 +25,9 @@ from gibiane.forms import Arg, Form, Function, Key
 from gibiane.nodes import Node
 from gibiane.values import ANY
 
+BEYOND = 1 << 63
+"""First ENTIER that has no place in 64 bits."""
+
 
 class Operator:
     """An operator: its description and its forms, some of them loaded when first needed."""
@@ -115,6 +118,18 @@ class Operator:
         if session.interactive and "?" in q.values:
             self.answer(session, q)
             return
+        given = q.values[:]
+        try:
+            self._apply(session, q, node)
+        except OverflowError:
+            # Only an ENTIER beyond 64 bits has no place among FLOTTANTs and arrays; anything else is a fault of ours.
+            if not any(type(v) is int and not -BEYOND <= v < BEYOND for v in given):
+                raise
+            diagnostic = make(26, "an ENTIER is too large for this operator", operator=self.name, span=q.span(node))
+            raise GibianeError(diagnostic) from None
+
+    def _apply(self, session: Any, q: Operands, node: Node) -> None:
+        """Run the first form that fits."""
         misses: list[Mismatch] = []
         tried: tuple[Form, ...] = ()
         i = 0

@@ -45,19 +45,28 @@ POWER = infix(
 )
 
 
+def _in_range(ctx: Context, symbol: str, a: Any, b: Any, value: Any) -> Any:
+    """Return a result; fail where it has left the range of a FLOTTANT."""
+    if type(value) is float and not math.isfinite(value) and math.isfinite(a) and math.isfinite(b):
+        ctx.fail(
+            26, "the result of {a} {symbol} {b} is too large for a FLOTTANT", at="b", a=a, b=b, symbol=symbol
+        )
+    return value
+
+
 @PLUS.form(A, B, gives=["ENTIER|FLOTTANT"])
 def _plus(ctx: Context, a: Any, b: Any) -> Any:
-    return a + b
+    return _in_range(ctx, "+", a, b, a + b)
 
 
 @MINUS.form(A, B, gives=["ENTIER|FLOTTANT"])
 def _minus(ctx: Context, a: Any, b: Any) -> Any:
-    return a - b
+    return _in_range(ctx, "-", a, b, a - b)
 
 
 @TIMES.form(A, B, gives=["ENTIER|FLOTTANT"])
 def _times(ctx: Context, a: Any, b: Any) -> Any:
-    return a * b
+    return _in_range(ctx, "*", a, b, a * b)
 
 
 def quotient(a: Any, b: Any) -> Any:
@@ -72,7 +81,7 @@ def quotient(a: Any, b: Any) -> Any:
 def _over(ctx: Context, a: Any, b: Any) -> Any:
     if b == 0:
         ctx.fail(26, "division by zero", at="b")
-    return quotient(a, b)
+    return _in_range(ctx, "/", a, b, quotient(a, b))
 
 
 @POWER.form(A, B, gives=["ENTIER|FLOTTANT"])
@@ -87,7 +96,9 @@ def _power(ctx: Context, a: Any, b: Any) -> Any:
     try:
         return a**b
     except OverflowError:
-        ctx.fail(26, "the result of {a} ** {b} is too large for a FLOTTANT", at="b", a=a, b=b)
+        ctx.fail(
+            26, "the result of {a} {symbol} {b} is too large for a FLOTTANT", at="b", a=a, b=b, symbol="**"
+        )
 
 
 def _comparison(name: str, summary: str, holds: Callable[[Any, Any], bool]) -> Operator:

@@ -170,7 +170,9 @@ LANGUAGE = {
     "O%HERITE OTHER ;": "O%HERITE AUTRE ;",
     # numbers
     "division by zero": "division par zéro",
-    "the result of {a} ** {b} is too large for a FLOTTANT": "le résultat de {a} ** {b} est trop grand pour un FLOTTANT",
+    "the result of {a} {symbol} {b} is too large for a FLOTTANT": "le résultat de {a} {symbol} {b} est trop grand pour un FLOTTANT",
+    "an ENTIER is too large for this operator": "un ENTIER est trop grand pour cet opérateur",
+    "the number {number} is too large for a FLOTTANT": "le nombre {number} est trop grand pour un FLOTTANT",
     "{a} ** {b} is too large": "{a} ** {b} est trop grand",
     "a real power of a negative number ({a} ** {b})": "puissance réelle d'un nombre négatif ({a} ** {b})",
     "an ENTIER exponent is allowed: {a} ** {whole}": "un exposant ENTIER est permis : {a} ** {whole}",

@@ -23,6 +23,7 @@ LISTS = {
     "what stands at this index is a {type}, not a list": "cet indice contient un {type} et non une liste",
     # mathematics
     "the lists have {left} and {right} values": "les listes ont {left} et {right} valeurs",
+    "a coordinate of the result is too large for a FLOTTANT": "une coordonnée du résultat est trop grande pour un FLOTTANT",
     "{count} values of the result are too large for a FLOTTANT": "{count} valeurs du résultat sont trop grandes pour un FLOTTANT",
     "value {number} of the result is too large for a FLOTTANT": "la valeur {number} du résultat est trop grande pour un FLOTTANT",
     "division by zero (value {number})": "division par zéro (valeur {number})",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from gibiane.forms import Arg
@@ -9,6 +11,7 @@ from gibiane.registry import Context, extend, operator
 from gibiane.values import ENTIER, FLOTTANT, POINT
 from gibiane_ops.mesh.building import dimension, new_point
 from gibiane_ops.values.maillage import Point
+from gibiane_ops.values.nodes import FloatArray
 
 NUMBER = (ENTIER, FLOTTANT)
 
@@ -57,23 +60,32 @@ def _pvec(ctx: Context, u: Point, v: Point | None) -> Point:
 A, B = Arg("a", POINT, "point or vector"), Arg("b", POINT, "vector")
 
 
+def _in_range(ctx: Context, compute: Callable[[], FloatArray], at: str) -> Point:
+    """Make a point; fail where a coordinate is too large."""
+    with np.errstate(over="ignore"):
+        coords = compute()
+    if not np.isfinite(coords).all():
+        ctx.fail(26, "a coordinate of the result is too large for a FLOTTANT", at=at)
+    return new_point(ctx, coords)
+
+
 @extend("+").form(A, B, gives=[POINT])
 def _plus(ctx: Context, a: Point, b: Point) -> Point:
-    return new_point(ctx, a.coords + b.coords)
+    return _in_range(ctx, lambda: a.coords + b.coords, "b")
 
 
 @extend("-").form(A, B, gives=[POINT])
 def _minus(ctx: Context, a: Point, b: Point) -> Point:
-    return new_point(ctx, a.coords - b.coords)
+    return _in_range(ctx, lambda: a.coords - b.coords, "b")
 
 
 @extend("*").form(Arg("x", NUMBER, "number"), A, gives=[POINT])
 def _times(ctx: Context, x: float, a: Point) -> Point:
-    return new_point(ctx, x * a.coords)
+    return _in_range(ctx, lambda: x * a.coords, "a")
 
 
 @extend("/").form(A, Arg("x", NUMBER, "number"), gives=[POINT])
 def _over(ctx: Context, a: Point, x: float) -> Point:
     if x == 0:
         ctx.fail(26, "division by zero", at="x")
-    return new_point(ctx, a.coords / x)
+    return _in_range(ctx, lambda: a.coords / x, "x")
