@@ -48,9 +48,7 @@ POWER = infix(
 def _in_range(ctx: Context, symbol: str, a: Any, b: Any, value: Any) -> Any:
     """Return a result; fail where it has left the range of a FLOTTANT."""
     if type(value) is float and not math.isfinite(value) and math.isfinite(a) and math.isfinite(b):
-        ctx.fail(
-            26, "the result of {a} {symbol} {b} is too large for a FLOTTANT", at="b", a=a, b=b, symbol=symbol
-        )
+        ctx.fail(26, "the result of {a} {symbol} {b} is too large for a FLOTTANT", at="b", a=a, b=b, symbol=symbol)
     return value
 
 
@@ -96,9 +94,7 @@ def _power(ctx: Context, a: Any, b: Any) -> Any:
     try:
         return a**b
     except OverflowError:
-        ctx.fail(
-            26, "the result of {a} {symbol} {b} is too large for a FLOTTANT", at="b", a=a, b=b, symbol="**"
-        )
+        ctx.fail(26, "the result of {a} {symbol} {b} is too large for a FLOTTANT", at="b", a=a, b=b, symbol="**")
 
 
 def _comparison(name: str, summary: str, holds: Callable[[Any, Any], bool]) -> Operator:
