@@ -15,9 +15,16 @@ from gibiane_ops.kernels.estimate.contact_bound import ContactTractions, contact
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
-from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, partners, shared_out
+from gibiane_ops.values.contact_estimates import (
+    check_energy,
+    contact_operands,
+    contact_results,
+    facet_zones,
+    partners,
+    shared_out,
+)
 from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
-from gibiane_ops.values.estimates import NORM, TABL, stresses_of
+from gibiane_ops.values.estimates import NORM, REFE, TABL, stresses_of
 from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior, held_at, held_directions
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.listes import ListReel
@@ -55,6 +62,7 @@ FLAT = 1e-6
     ),
     NORM,
     TABL,
+    REFE,
     gives=[FLOTTANT, FLOTTANT, FLOTTANT, MCHAML],
 )
 def _bound_with_contact(
@@ -75,12 +83,14 @@ def _bound_with_contact(
     sweeps: int | None,
     norm: str | None,
     tabl: bool,
+    refe: Any,
 ) -> Any:
     given = contact_operands(ctx, model, mc, u, rea, [("sig", sig), ("mat", mat), ("matc", matc)])
     stress, material, _ = stresses_of(ctx, *given.solid)
     zones = solid_zones(ctx, given.model)
     outside = exterior(ctx, zones, cl, pres, fsur)
     states = list(solved_contacts(ctx, given.contact, given.law, given.u, given.reaction))
+    check_energy(ctx, states, refe)
     if not all(state.pairs.plain.all() for state in states):
         ctx.fail(
             251,
@@ -117,7 +127,7 @@ def _bound_with_contact(
     more: dict[str, Any] = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
     if all(state.zone.law == "UNILATERAL" for state in states):
         more |= energy_bounds(solid, float(sum(each.sum() for each in totals)))
-    return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, more)
+    return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, refe, more)
 
 
 def _forces(state: SolvedContact) -> list[tuple[IntArray, FloatArray]]:

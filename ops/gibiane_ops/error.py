@@ -16,7 +16,7 @@ from gibiane_ops.kernels.estimate.zz import solid_error
 from gibiane_ops.values.algebra import added, values_of
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import SolvedContact, solved_contacts
-from gibiane_ops.values.contact_estimates import contact_operands, contact_results, facet_zones, shared_out
+from gibiane_ops.values.contact_estimates import check_energy, contact_operands, contact_results, facet_zones, shared_out
 from gibiane_ops.values.estimates import (
     KIND,
     NORM,
@@ -127,6 +127,7 @@ def _indicator(
         ("DENSITE", "NODE", "DLUM"), "contact part: densities (default), nodal forces, lumped densities", name="variant"
     ),
     TABL,
+    REFE,
     gives=[FLOTTANT, FLOTTANT, FLOTTANT, MCHAML],
 )
 def _with_contact(
@@ -144,6 +145,7 @@ def _with_contact(
     norm: str | None,
     variant: str | None,
     tabl: bool,
+    refe: Any,
 ) -> Any:
     given = contact_operands(ctx, model, mc, u, rea, [("sig", sig), ("mat", mat), ("matc", matc), ("smooth", smooth)])
     stress, material, smooth = stresses_of(ctx, *given.solid)
@@ -151,11 +153,13 @@ def _with_contact(
     blocks = [(z.shape, z.cells) for z in parts.zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
-    for state in solved_contacts(ctx, given.contact, given.law, given.u, given.reaction):
+    states = list(solved_contacts(ctx, given.contact, given.law, given.u, given.reaction))
+    check_energy(ctx, states, refe)
+    for state in states:
         found, on_facets = _contact_part(ctx, state, (variant or "DENSITE")[:4], parts.zones[0].mode)
         facets += on_facets
         totals = shared_out(ctx, state, blocks, found, totals)
-    return contact_results(ctx, parts, totals, norm, tabl, SMOOTHED, facets)
+    return contact_results(ctx, parts, totals, norm, tabl, SMOOTHED, facets, refe)
 
 
 def _contact_part(

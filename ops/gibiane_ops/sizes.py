@@ -43,10 +43,12 @@ TAIL = operator(
     "it varies little; 'ALLO' bounds how long. Nodes at one place in two solids (contact) get "
     "one size.",
     example="""
-    OPTI DIME 3 ELEM CUB8 ;
-    S = (DROI 1 (0. 0. 0.) (1. 0. 0.)) TRAN 1 (0. 1. 0.) ; V = S VOLU 2 'TRAN' (0. 0. 1.) ;
-    MO = MODE V 'MECANIQUE' 'ELASTIQUE' 'ISOTROPE' ;
-    MESS (MAXI (TAILLE 'DIAMETRE_MIN' MO)) ;
+    OPTI DIME 2 ELEM TRI3 MODE PLAN DEFO ;
+    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ; MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
+    U = RESO ((RIGI MO MA) ET (BLOQ 'DEPL' (COTE 4 S))) (FSUR 'MASS' MO (0. -1.) (COTE 2 S)) ;
+    X CARTE = ERREUR 'SPR' MO (SIGM MO MA U) MA ; MESS 'error ' X ', smallest element ' (MINI (TAILLE 'DIAMETRE_MIN' MO)) ;
+    CHD NB = TAILLE 'ERREUR' CARTE MO 'PREC' 0.1 'SING' ; MESS 'wanted ' (MINI CHD) ' to ' (MAXI CHD) ', elements ' NB ;
+    S2 = REMAILLER S CHD ; MESS 'obtained ' (NBEL S2) ;
     """,
     see=["ERREUR", "REMAILLER"],
 )

@@ -157,14 +157,19 @@ def test_contact_error_decreases_on_fine_meshes(mu):
     [
         (small_cube, 1, 10.133, "MOYE", 0.58), (small_cube, 1, 10.133, "PROJ", 0.53),
         (small_cube, 1, 10.133, "SPR", 0.81), (small_cube, 1, 10.133, "MOYC", 0.85),
+        (small_cube, 1, 10.133, "FULL", 0.69),
         (small_cube, 2, 10.133, "MOYE", 0.61), (small_cube, 2, 10.133, "PROJ", 0.57),
         (small_cube, 2, 10.133, "SPR", 0.78), (small_cube, 2, 10.133, "MOYC", 0.84),
+        (small_cube, 2, 10.133, "FULL", 0.68),
         (equal_cubes, 2, 733.087, "MOYE", 0.43), (equal_cubes, 2, 733.087, "PROJ", 0.37),
         (equal_cubes, 2, 733.087, "SPR", 0.84), (equal_cubes, 2, 733.087, "MOYC", 0.91),
+        (equal_cubes, 2, 733.087, "FULL", 0.73),
         (equal_cubes, 4, 733.087, "MOYE", 0.55), (equal_cubes, 4, 733.087, "PROJ", 0.49),
         (equal_cubes, 4, 733.087, "SPR", 0.78), (equal_cubes, 4, 733.087, "MOYC", 0.93),
+        (equal_cubes, 4, 733.087, "FULL", 0.67),
         (equal_cubes, 8, 733.087, "MOYE", 0.60), (equal_cubes, 8, 733.087, "PROJ", 0.54),
         (equal_cubes, 8, 733.087, "SPR", 0.81), (equal_cubes, 8, 733.087, "MOYC", 0.93),
+        (equal_cubes, 8, 733.087, "FULL", 0.68),
     ],
 )  # fmt: skip
 def test_effectivity_on_tied_cubes(scene, n, exact, method, theta):

@@ -13,7 +13,7 @@ from gibiane_ops.kernels.estimate.combine import combine, facets_to_cells
 from gibiane_ops.values.algebra import SCAL, SCALAIRE
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import SolvedContact
-from gibiane_ops.values.estimates import Guarantee, Parts, table_of
+from gibiane_ops.values.estimates import Guarantee, Parts, add_quality, table_of, without_table
 from gibiane_ops.values.maillage import Block, Maillage
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
@@ -110,6 +110,7 @@ def contact_results(
     tabl: bool,
     guarantee: Guarantee,
     facets: Sequence[ChamZone],
+    reference: float | MChaml | None,
     more: Mapping[str, Any] | None = None,
 ) -> Any:
     """Return the solid, contact and total relative errors and their map, or the TABLE of everything."""
@@ -121,9 +122,23 @@ def contact_results(
     ]
     field = MChaml(zones, SCALAIRE, "GRAVITE", "error")
     if not tabl:
+        without_table(ctx, reference)
         return found.solid, found.contact, found.total, field
     table = table_of(found, parts, field, norm, guarantee)
     table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE", "error"))
     for index, value in (more or {}).items():
         table.set(index, value)
+    squares = [e.error + c for e, c in zip(parts.errors, contact, strict=True)]
+    add_quality(ctx, table, parts, found, squares, reference)
     return table
+
+
+def check_energy(ctx: Context, states: Sequence[SolvedContact], reference: float | MChaml | None) -> None:
+    """Refuse the energy of an exact solution with friction: its difference is no measure of the error."""
+    if isinstance(reference, float) and any(s.zone.law == "TRESCA" or (s.mu > 0).any() for s in states):
+        ctx.fail(
+            21,
+            "with friction the energy of the exact solution does not tell the error",
+            at="refe",
+            hint="give the map of the error to a solution on a much finer mesh ('ABSO')",
+        )

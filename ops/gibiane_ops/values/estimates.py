@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context
 from gibiane.values import FLOTTANT, MCHAML, Table
 from gibiane_ops.kernels.estimate.combine import RelativeError, combine
-from gibiane_ops.kernels.estimate.effectivity import Effectivity, effectivity
+from gibiane_ops.kernels.estimate.effectivity import effectivity
 from gibiane_ops.kernels.estimate.zz import SolidError
 from gibiane_ops.values.algebra import SCAL, SCALAIRE
 from gibiane_ops.values.champs import ChamZone, MChaml
@@ -97,25 +97,38 @@ def results(
         chosen = found.solid_map
     field = field_of(parts.zones, chosen)
     if not tabl:
-        if reference is not None:
-            ctx.fail(26, "'REFE' goes with 'TABL': THETA and SD are indices of the table", at="refe")
+        without_table(ctx, reference)
         return (found.total, field, found.absolute) if wanted_results(ctx) > 2 else (found.total, field)
     table = table_of(found, parts, field, norm, guarantee)
     for index, value in (more or {}).items():
         table.set(index, value)
-    if reference is not None:
-        quality = _quality(ctx, parts, found, reference)
-        table.set("THETA", quality.theta)
-        if isinstance(reference, MChaml):
-            table.set("SD", quality.deviation)
+    add_quality(ctx, table, parts, found, [e.error for e in parts.errors], reference)
     return table
 
 
-def _quality(ctx: Context, parts: Parts, found: RelativeError, reference: float | MChaml) -> Effectivity:
-    """Compare an estimate with the true error, known by its map or by the energy of the exact solution."""
+def without_table(ctx: Context, reference: float | MChaml | None) -> None:
+    """Refuse a reference where there is no TABLE to put the quality into."""
+    if reference is not None:
+        ctx.fail(26, "'REFE' goes with 'TABL': THETA and SD are indices of the table", at="refe")
+
+
+def add_quality(
+    ctx: Context,
+    table: Table,
+    parts: Parts,
+    found: RelativeError,
+    squares: Sequence[FloatArray],
+    reference: float | MChaml | None,
+) -> None:
+    """Put THETA and SD into the TABLE of an estimate of known squares where there is a reference."""
+    if reference is None:
+        return
     if isinstance(reference, MChaml):
         true = [on_zone(ctx, reference, zone, "refe").values[:, 0, 0] ** 2 for zone in parts.zones]
-        return effectivity(np.concatenate([e.error for e in parts.errors]), np.concatenate(true))
+        quality = effectivity(np.concatenate(squares), np.concatenate(true))
+        table.set("THETA", quality.theta)
+        table.set("SD", quality.deviation)
+        return
     left = reference - found.energy
     if left <= 0:
         ctx.fail(
@@ -126,7 +139,7 @@ def _quality(ctx: Context, parts: Parts, found: RelativeError, reference: float 
             energy=f"{found.energy:.6g}",
             hint="both are the integral of stress by strain, without 1/2",
         )
-    return Effectivity(found.absolute / float(np.sqrt(left)), float("nan"))
+    table.set("THETA", found.absolute / float(np.sqrt(left)))
 
 
 def table_of(found: RelativeError, parts: Parts, field: MChaml, norm: str | None, guarantee: Guarantee) -> Table:

@@ -60,12 +60,44 @@ def test_constant_stress_is_reproduced(name, mesh, method):
     np.testing.assert_allclose(nodal, np.tile(VALUE, (len(points), 1)), rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize("method", ["MOYE", "PROJ", "SPR"])
+@pytest.mark.parametrize("method", ["MOYE", "PROJ", "SPR", "FULL"])
 def test_linear_stress_is_reproduced_on_bricks(method):
     points, cells = brick(4)
-    found = recovery.recover(points, [block("CUB8", points, cells, linear, centre=method == "SPR")], method)
+    centre = method in ("SPR", "FULL")
+    found = recovery.recover(points, [block("CUB8", points, cells, linear, centre=centre)], method)
     np.testing.assert_allclose(found.nodal, linear(points), rtol=0, atol=1e-10)
     assert found.fallbacks == 0
+
+
+def test_full_patches_reproduce_products_of_coordinates():
+    points, cells = brick(4)
+
+    def multilinear(x):
+        xyz = x[..., 0] * x[..., 1] * x[..., 2]
+        return linear(x) + np.stack([x[..., 0] * x[..., 1], x[..., 1] * x[..., 2], x[..., 0] * x[..., 2]] * 2, -1) + (
+            xyz[..., None] * VALUE
+        )
+
+    sampled = block("CUB8", points, cells, multilinear, centre=True)
+    found = recovery.patch_recovery(points, [sampled], full=True)
+    np.testing.assert_allclose(found.nodal, multilinear(points), rtol=0, atol=1e-10)
+    assert found.flattened == 0
+    assert np.abs(recovery.patch_recovery(points, [sampled]).nodal - multilinear(points)).max() > 0.1
+
+
+def test_full_patches_of_three_quadrangles_are_linear():
+    turn = np.arange(6) * np.pi / 3
+    points = np.vstack([[0.0, 0.0], np.stack([np.cos(turn), np.sin(turn)], 1)])
+    cells = np.array([[0, 1, 2, 3], [0, 3, 4, 5], [0, 5, 6, 1]])
+    quad = shape("QUA4")
+
+    def field(x):
+        return np.stack([1 + x[..., 0], x[..., 1], 2 * x[..., 0] - x[..., 1], 0 * x[..., 0]], -1)
+
+    at = np.repeat(geometry.centroids(quad, points[cells])[:, None], len(quad.gauss[1]), axis=1)
+    found = recovery.patch_recovery(points, [StressBlock(quad, cells, field(at))], full=True)
+    np.testing.assert_allclose(found.nodal, field(points), rtol=0, atol=1e-12)
+    assert found.flattened == 1
 
 
 @pytest.mark.parametrize("n", [2, 3])

@@ -1,4 +1,4 @@
-"""Least-squares polynomials of first or second degree through samples, one for each of many patches."""
+"""Least-squares polynomials through samples, one for each of many patches: of first or second degree, or multilinear."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ UNSEEN = 0.02
 """A curvature whose mean square over the samples is smaller than this, in units of their spread, is left out.
 
 Inner patches of usual meshes have 0.4 and more, slivers 0.15; one curved layer sees its curvature too dimly."""
+
+MULTILINEAR = 0
+"""In place of a degree: linear terms and the products xy, in space also xz, yz and xyz."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,7 @@ def _ranges(start: IntArray, length: IntArray) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class Fits:
-    """Polynomials ``value + d . slope + d . curvature . d`` with d the place less the centre.
+    """Polynomials ``value + d . slope + d . curvature . d + triple d_x d_y d_z`` with d the place less the centre.
 
     Attributes
     ----------
@@ -81,6 +84,8 @@ class Fits:
     value : (n, c) float64
     slope : (n, dim, c) float64
     curvature : (n, dim, dim, c) float64
+    triple : (n, c) float64
+        Zero in a plane.
     failed : (n,) bool
         Too few samples for a slope: the polynomial is their mean.
     flattened : (n,) bool
@@ -91,6 +96,7 @@ class Fits:
     value: FloatArray
     slope: FloatArray
     curvature: FloatArray
+    triple: FloatArray
     failed: NDArray[np.bool_]
     flattened: NDArray[np.bool_]
 
@@ -102,6 +108,8 @@ class Fits:
             n, dim = d.shape[0], d.shape[2]
             squares = (d.swapaxes(1, 2) * d).reshape(n, 1, dim * dim)
             result += np.matmul(squares, self.curvature.reshape(len(self.centre), dim * dim, -1)[patch])[:, 0]
+        if self.triple.any():
+            result += d[:, 0].prod(axis=1)[:, None] * self.triple[patch]
         return np.asarray(result, np.float64)
 
 
@@ -112,7 +120,7 @@ def fit(samples: Samples, degree: IntArray) -> Fits:
     ----------
     samples : Samples
     degree : (n,) int64
-        1 or 2 for each patch.
+        1, 2 or `MULTILINEAR` for each patch.
 
     Returns
     -------
@@ -122,7 +130,8 @@ def fit(samples: Samples, degree: IntArray) -> Fits:
     -----
     Coordinates are scaled by the second moments of the samples, so that thin patches are like others. Curvatures are
     fitted to what constant and linear terms leave, in the directions in which the samples determine them; the least
-    sum of squares is unique in the scaled coordinates. All functions up to the first degree are reproduced wherever
+    sum of squares is unique in the scaled coordinates. Products of coordinates, which depend on the axes, are fitted in
+    the same way in those of the places, each scaled by the spread along it. All functions up to the first degree are reproduced wherever
     slopes exist.
 
     Cost
@@ -131,7 +140,7 @@ def fit(samples: Samples, degree: IntArray) -> Fits:
     """
     n, dim, c = len(degree), samples.places.shape[1], samples.values.shape[1]
     found = Fits(
-        np.zeros((n, dim)), np.zeros((n, c)), np.zeros((n, dim, c)), np.zeros((n, dim, dim, c)),
+        np.zeros((n, dim)), np.zeros((n, c)), np.zeros((n, dim, c)), np.zeros((n, dim, dim, c)), np.zeros((n, c)),
         np.zeros(n, bool), np.zeros(n, bool),
     )  # fmt: skip
     length = np.bincount(samples.patch, minlength=n)
@@ -161,6 +170,8 @@ def _fit_alike(found: Fits, patches: IntArray, places: FloatArray, values: Float
     slope = np.matmul(y.swapaxes(1, 2), values) / k
     if degree == 2 and len(patches):
         slope += _add_curvature(found, patches, scaling, y, values)
+    elif degree == MULTILINEAR and len(patches):
+        slope += _add_products(found, patches, offset, y, values)
     found.slope[patches] = np.matmul(scaling, slope)
 
 
@@ -168,22 +179,49 @@ def _add_curvature(
     found: Fits, patches: IntArray, scaling: FloatArray, y: FloatArray, values: FloatArray
 ) -> FloatArray:
     """Fit the quadratic terms to what the linear ones leave; return what this adds to the slopes in y."""
-    k, dim = y.shape[1:]
+    dim = y.shape[2]
     i, j = np.triu_indices(dim)
     # The root of 2 makes the sum of the squares of the coefficients that of the curvature matrix: no axis is preferred.
     root = np.where(i == j, 1.0, np.sqrt(2.0))
-    square = y[:, :, i] * y[:, :, j] * root
-    mean = square.mean(axis=1)
-    along = np.matmul(y.swapaxes(1, 2), square) / k
-    rest = square - mean[:, None] - np.matmul(y, along)
+    coefficients, slope = _fit_terms(found, patches, y[:, :, i] * y[:, :, j] * root, y, values)
+    matrix = np.zeros((len(patches), dim, dim, values.shape[2]))
+    matrix[:, i, j] = matrix[:, j, i] = coefficients / np.where(i == j, 1.0, np.sqrt(2.0))[:, None]
+    found.curvature[patches] = np.einsum("nai,nijc,nbj->nabc", scaling, matrix, scaling, optimize=True)
+    return slope
+
+
+def _add_products(found: Fits, patches: IntArray, offset: FloatArray, y: FloatArray, values: FloatArray) -> FloatArray:
+    """Fit the products of coordinates to what the linear terms leave; return what this adds to the slopes in y."""
+    dim = y.shape[2]
+    i, j = np.triu_indices(dim, 1)
+    size = np.sqrt((offset**2).mean(axis=1))
+    d = offset / size[:, None]
+    terms = d[:, :, i] * d[:, :, j]
+    if dim == 3:
+        terms = np.concatenate([terms, d.prod(axis=2, keepdims=True)], axis=2)
+    coefficients, slope = _fit_terms(found, patches, terms, y, values)
+    half = coefficients[:, : len(i)] / (2 * size[:, i] * size[:, j])[:, :, None]
+    matrix = np.zeros((len(patches), dim, dim, values.shape[2]))
+    matrix[:, i, j] = matrix[:, j, i] = half
+    found.curvature[patches] = matrix
+    if dim == 3:
+        found.triple[patches] = coefficients[:, -1] / size.prod(axis=1)[:, None]
+    return slope
+
+
+def _fit_terms(
+    found: Fits, patches: IntArray, terms: FloatArray, y: FloatArray, values: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Fit terms (n, k, t) to what constant and linear ones leave; return their coefficients, and their slopes in y."""
+    k = y.shape[1]
+    mean = terms.mean(axis=1)
+    along = np.matmul(y.swapaxes(1, 2), terms) / k
+    rest = terms - mean[:, None] - np.matmul(y, along)
     seen, modes = np.linalg.eigh(np.matmul(rest.swapaxes(1, 2), rest) / k)
     kept = seen > UNSEEN
     inverse = np.where(kept, 1.0 / np.where(kept, seen, 1.0), 0.0)
     loads = np.matmul(modes.swapaxes(1, 2), np.matmul(rest.swapaxes(1, 2), values) / k)
-    coefficients = np.matmul(modes, inverse[:, :, None] * loads)
+    coefficients = np.asarray(np.matmul(modes, inverse[:, :, None] * loads), np.float64)
     found.flattened[patches] = ~kept.all(axis=1)
     found.value[patches] -= np.matmul(mean[:, None], coefficients)[:, 0]
-    matrix = np.zeros((len(patches), dim, dim, values.shape[2]))
-    matrix[:, i, j] = matrix[:, j, i] = coefficients / np.where(i == j, 1.0, np.sqrt(2.0))[:, None]
-    found.curvature[patches] = np.einsum("nai,nijc,nbj->nabc", scaling, matrix, scaling, optimize=True)
-    return np.asarray(-np.matmul(along, coefficients), np.float64)
+    return coefficients, np.asarray(-np.matmul(along, coefficients), np.float64)

@@ -10,7 +10,7 @@ from gibiane_ops.kernels.recovery.averages import mean_of_centres, mean_of_nodes
 from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock
 from gibiane_ops.kernels.recovery.patches import patch_recovery
 
-METHODS = ("MOYE", "MOYC", "PROJ", "LUMP", "SPR")
+METHODS = ("MOYE", "MOYC", "PROJ", "LUMP", "SPR", "FULL")
 
 
 def recover(
@@ -22,8 +22,9 @@ def recover(
     ----------
     points : (n_points, dim) float64, length
     blocks : list of StressBlock
-    method : {'MOYE', 'MOYC', 'PROJ', 'LUMP', 'SPR'}
-        Nodal mean of extrapolated or of centre values, L2 projection (consistent or lumped), patch recovery.
+    method : {'MOYE', 'MOYC', 'PROJ', 'LUMP', 'SPR', 'FULL'}
+        Nodal mean of extrapolated or of centre values, L2 projection (consistent or lumped), patch recovery
+        with complete polynomials or with the functions of the elements.
     degree : int, optional
         Highest degree of the patches; that of the elements if absent.
 
@@ -47,5 +48,7 @@ def recover(
             return Recovered(project(points, blocks, lumped=method == "LUMP"))
         case "SPR":
             return patch_recovery(points, blocks, degree)
+        case "FULL":
+            return patch_recovery(points, blocks, degree, full=True)
         case _:
             raise BadValue("method", method, f"one of {' '.join(METHODS)}")

@@ -10,12 +10,18 @@ import scipy.sparse as sp
 from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock
-from gibiane_ops.kernels.recovery.fits import Samples, fit
+from gibiane_ops.kernels.recovery.fits import MULTILINEAR, Samples, fit
 from gibiane_ops.kernels.recovery.samples import superconvergent_samples
 from gibiane_ops.kernels.topology import Block
 
 
-def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: int | None = None) -> Recovered:
+TENSOR = ("QUA4", "CUB8")
+"""Elements whose own functions hold products of coordinates."""
+
+
+def patch_recovery(
+    points: FloatArray, blocks: Sequence[StressBlock], degree: int | None = None, *, full: bool = False
+) -> Recovered:
     """Smooth by superconvergent patches (SPR).
 
     Parameters
@@ -24,6 +30,9 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     blocks : list of StressBlock
     degree : int, optional
         Highest degree of the polynomials; that of the elements if absent.
+    full : bool
+        Take the functions of the elements where all those of a patch are QUA4 or CUB8: bilinear or trilinear, in the
+        axes of the points. On linear simplices these are the linear ones.
 
     Returns
     -------
@@ -56,6 +65,11 @@ def patch_recovery(points: FloatArray, blocks: Sequence[StressBlock], degree: in
     highest = np.full(n_points, 2 if degree is None else degree)
     for block in blocks:
         highest[block.cells] = np.minimum(highest[block.cells], block.shape.degree)
+    if full:
+        tensor = np.ones(n_points, bool)
+        for block in blocks:
+            tensor[block.cells] &= block.shape.name in TENSOR
+        highest[tensor] = MULTILINEAR
     sampled = [superconvergent_samples(points, block) for block in blocks]
     star = topology.node_to_cells(mesh, n_points)
     fits = fit(Samples.around(own, star, sampled), highest[own])
