@@ -16,7 +16,13 @@ from gibiane_ops.kernels.estimate.zz import solid_error
 from gibiane_ops.values.algebra import added, values_of
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import SolvedContact, solved_contacts
-from gibiane_ops.values.contact_estimates import check_energy, contact_operands, contact_results, facet_zones, shared_out
+from gibiane_ops.values.contact_estimates import (
+    check_energy,
+    contact_operands,
+    contact_results,
+    facet_zones,
+    shared_out,
+)
 from gibiane_ops.values.estimates import (
     KIND,
     NORM,

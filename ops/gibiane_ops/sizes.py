@@ -44,9 +44,11 @@ TAIL = operator(
     "one size.",
     example="""
     OPTI DIME 2 ELEM TRI3 MODE PLAN DEFO ;
-    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ; MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
+    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ;
+    MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
     U = RESO ((RIGI MO MA) ET (BLOQ 'DEPL' (COTE 4 S))) (FSUR 'MASS' MO (0. -1.) (COTE 2 S)) ;
-    X CARTE = ERREUR 'SPR' MO (SIGM MO MA U) MA ; MESS 'error ' X ', smallest element ' (MINI (TAILLE 'DIAMETRE_MIN' MO)) ;
+    X CARTE = ERREUR 'SPR' MO (SIGM MO MA U) MA ; MESS 'error ' X ;
+    MESS 'smallest element ' (MINI (TAILLE 'DIAMETRE_MIN' MO)) ;
     CHD NB = TAILLE 'ERREUR' CARTE MO 'PREC' 0.1 'SING' ; MESS 'wanted ' (MINI CHD) ' to ' (MAXI CHD) ', elements ' NB ;
     S2 = REMAILLER S CHD ; MESS 'obtained ' (NBEL S2) ;
     """,

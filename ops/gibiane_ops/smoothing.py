@@ -31,8 +31,9 @@ LISSER = operator(
     summary="smooth a stress field: continuous values at the nodes of each solid",
     notice="'SPR' (the default): superconvergent patches (Zienkiewicz-Zhu 1992), polynomials of the degree of the "
     "elements about the corners inside the solid, prolonged to its surface; 'ORDRE' 1 asks for linear ones in "
-    "quadratic elements, 'PLEIN' for the functions of QUA4 and CUB8 themselves, with products of coordinates (full basis: "
-    "often 10 to 15 % less error seen than with the linear one on bricks). 'MOYE': mean at the nodes of the stresses extrapolated from the integration points, what "
+    "quadratic elements, 'PLEIN' for the functions of QUA4 and CUB8 themselves, with products of coordinates (full "
+    "basis: on bricks it sees 10 to 15 % less of the error than the linear one). 'MOYE': mean at the nodes of the "
+    "stresses extrapolated from the integration points, what "
     "reproduces the classical indicator; 'MOYC': mean of the values at the centres, crude at the surface; 'PROJ': L2 "
     "projection, with 'LUMP' on the lumped mass. To estimate the error of quadratic elements take 'SPR': 'MOYE' and "
     "'PROJ' stay so near to their stresses that the error seems several times smaller than it is. To read the stress "
@@ -45,7 +46,8 @@ LISSER = operator(
     " solids meet.",
     example="""
     OPTI DIME 2 ELEM QUA4 MODE PLAN DEFO ;
-    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ; MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
+    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ;
+    MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
     CL = BLOQ 'DEPL' (COTE 4 S) ; F = 0. -1. ; G = COTE 2 S ;
     U = RESO ((RIGI MO MA) ET CL) (FSUR 'MASS' MO F G) ; SIG = SIGM MO MA U ;
     SL = LISSER 'SPR' MO SIG ; MESS (MAXI (EXCO 'SMXX' SL)) ;

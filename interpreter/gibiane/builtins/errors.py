@@ -25,14 +25,15 @@ ERRE = operator(
     "given ('PRES', 'FSUR', 'VOLU'); guaranteed: not below the error, and 10 to 25 % above it after two sweeps "
     "('BALA'); bricks are cut into tetrahedra, and it is guaranteed where they are parallelepipeds. A facet "
     "counts as held where BLOQ holds all its nodes. 'EXAC': the true error, from an exact stress "
-    "or a procedure ('PROC'). `XS XC XG CARTE = ERREUR 'CONTACT' MODL SIG MAT MC MATC U REA` adds the contact part: an estimate, except with 'RDC', where the sum is "
-    "guaranteed without friction and with Tresca's, when contact tractions within the law exist; never with "
+    "or a procedure ('PROC'). `XS XC XG CARTE = ERREUR 'CONTACT' MODL SIG MAT MC MATC U REA` adds the contact part: an "
+    "estimate, except with 'RDC', where the sum is guaranteed without friction and with Tresca's, when contact tractions within the law exist; never with "
     "Coulomb's: GARANTI and a note tell. Where prescribed displacements and gaps are zero, INFERIEURE and SUPERIEURE "
     "of 'RDC' 'TABL' bound the energy of the exact solution (dual analysis). The procedure RICHARDSON extrapolates the "
     "energies of three meshes.",
     example="""
     OPTI ERRE IGNO DIME 2 ELEM QUA4 MODE PLAN DEFO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;
-    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ; MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
+    S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ;
+    MO = MODE S 'MECANIQUE' 'ELASTIQUE' ; MA = MATE MO 'YOUN' 2.E5 'NU' 0.3 ;
     CL = BLOQ 'DEPL' (COTE 4 S) ; F = 0. -1. ; G = COTE 2 S ;
     U = RESO ((RIGI MO MA) ET CL) (FSUR 'MASS' MO F G) ; SIG = SIGM MO MA U ;
     X CARTE = ERREUR 'SPR' MO SIG MA ; MESS 'estimate ' X ', largest share ' (MAXI CARTE) ;

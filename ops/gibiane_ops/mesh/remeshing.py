@@ -44,9 +44,9 @@ REMA = operator(
     "node for node. 'LOCA' divides elements in place and puts them together again where the sizes allow: TRI3 and "
     "TET4 are halved, without hanging nodes; QUA4 and CUB8 are cut in 4 or 8, and RELA MODL holds their hanging "
     "nodes. Contact pairs are divided alike (QUA4, CUB8: all the elements of a contact). The table given back holds "
-    "under ARBRE what coarsening needs; the mesh gets about as many elements as the sizes ask for on the whole, so that "
-    "sizes that vary much within an element change little at a time. `M2 T2 = REMAILLER M1 MARQ 'GROU' T1`, also with a size and 'LOCA': elements "
-    "where the field MARQ exceeds 0.5 become quadratic, others linear, as those of a contact stay; RELA MODL ties the "
+    "under ARBRE what coarsening needs; the mesh gets about as many elements as the sizes ask for on the whole, so "
+    "that sizes that vary much within an element change little at a time. `M2 T2 = REMAILLER M1 MARQ 'GROU' T1`, also "
+    "with a size and 'LOCA': elements where the field MARQ exceeds 0.5 become quadratic, others linear, as those of a contact stay; RELA MODL ties the "
     "mid-nodes beside linear elements. `M2 T2 = REMAILLER M1 'DEPL' V 'GROU' T1`: the same elements on new nodes, "
     "moved by the field V. Meshes of second degree get mid-nodes again; on the boundary they are those of "
     "new straight edges, unless it is kept.",
@@ -55,7 +55,8 @@ REMA = operator(
     S2 = REMAILLER S 0.1 ; MESS 'triangles of side 0.1: ' (NBEL S2) ;
     TG = TABL ; TG.'BAS' = COTE 1 S ; TG.'COIN' = S POIN 'PROC' (0. 0.) ;
     CHD = 0.03 + (0.3 * (((COOR 1 S) ** 2) + ((COOR 2 S) ** 2))) ;
-    S3 T3 = REMAILLER S CHD 'GROU' TG ; MESS 'small ones at the corner: ' (NBEL S3) ', on the side BAS ' (NBEL (T3.'BAS')) ;
+    S3 T3 = REMAILLER S CHD 'GROU' TG ;
+    MESS 'small ones at the corner: ' (NBEL S3) ', on the side BAS ' (NBEL (T3.'BAS')) ;
     S4 T4 = REMAILLER S CHD 'GROU' TG 'LOCA' ; MESS 'divided in place: ' (NBEL S4) ;
     S5 T5 = REMAILLER S4 1. 'GROU' T4 'LOCA' ; MESS 'put together again: ' (NBEL S5) ;
     """,

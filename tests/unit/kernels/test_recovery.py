@@ -74,8 +74,10 @@ def test_full_patches_reproduce_products_of_coordinates():
 
     def multilinear(x):
         xyz = x[..., 0] * x[..., 1] * x[..., 2]
-        return linear(x) + np.stack([x[..., 0] * x[..., 1], x[..., 1] * x[..., 2], x[..., 0] * x[..., 2]] * 2, -1) + (
-            xyz[..., None] * VALUE
+        return (
+            linear(x)
+            + np.stack([x[..., 0] * x[..., 1], x[..., 1] * x[..., 2], x[..., 0] * x[..., 2]] * 2, -1)
+            + (xyz[..., None] * VALUE)
         )
 
     sampled = block("CUB8", points, cells, multilinear, centre=True)

@@ -1,4 +1,4 @@
-"""Least-squares polynomials through samples, one for each of many patches: of first or second degree, or multilinear."""
+"""Least-squares polynomials through samples, one for each of many patches: first or second degree, multilinear."""
 
 from __future__ import annotations
 
@@ -131,8 +131,8 @@ def fit(samples: Samples, degree: IntArray) -> Fits:
     Coordinates are scaled by the second moments of the samples, so that thin patches are like others. Curvatures are
     fitted to what constant and linear terms leave, in the directions in which the samples determine them; the least
     sum of squares is unique in the scaled coordinates. Products of coordinates, which depend on the axes, are fitted in
-    the same way in those of the places, each scaled by the spread along it. All functions up to the first degree are reproduced wherever
-    slopes exist.
+    the same way in those of the places, each scaled by the spread along it. All functions up to the first degree are
+    reproduced wherever slopes exist.
 
     Cost
     ----

@@ -14,7 +14,6 @@ from gibiane_ops.kernels.recovery.fits import MULTILINEAR, Samples, fit
 from gibiane_ops.kernels.recovery.samples import superconvergent_samples
 from gibiane_ops.kernels.topology import Block
 
-
 TENSOR = ("QUA4", "CUB8")
 """Elements whose own functions hold products of coordinates."""
 
