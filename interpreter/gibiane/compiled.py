@@ -32,7 +32,7 @@ class Fallback(Exception):
 
 def _beyond() -> Any:
     """Leave a result that is not finite to the queue machine, which refuses it or tells where it comes from."""
-    raise FALLBACK
+    raise Fallback
 
 
 # A finite number less itself is 0; infinity less itself is no number.
