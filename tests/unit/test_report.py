@@ -157,11 +157,11 @@ def test_a_click_on_a_heading_sorts_a_table(page):
 
 def test_a_chart_has_its_points_its_front_and_its_records(page):
     page.value("gibiane.open(1)")
-    assert page.value("document.querySelectorAll('.chart circle[data-point]').length") == 7
+    assert page.value("document.querySelectorAll('.chart [data-point]').length") == 7
     caption = page.value("document.querySelectorAll('section')[1].querySelector('.caption').textContent")
     assert caption == "Pareto front (dashed), by increasing abscissa: CUB8 – CU20, adaptive"
     place = page.value(
-        '(() => { const b = document.querySelector(\'circle[data-curve="0"][data-point="3"]\').getBoundingClientRect();'
+        '(() => { const b = document.querySelector(\'[data-curve="0"][data-point="3"]\').getBoundingClientRect();'
         " return [b.x + b.width / 2, b.y + b.height / 2]; })()"
     )
     page.mouse("mouseMoved", *place)
@@ -190,13 +190,109 @@ def test_a_chart_is_zoomed_by_dragging_and_comes_back(page):
     assert page.value("gibiane.charts.cost.range") == before
 
 
+def test_axes_have_round_ticks_and_never_one_alone(page):
+    """A short logarithmic range holds no power of ten and perhaps one of 1, 2, 5."""
+
+    def labels(log, low, high, length=400):
+        return page.value(f"new Axis({str(log).lower()}, {low}, {high}, {length}, 0).ticks(26).map((t) => t[1]).filter(Boolean)")
+
+    assert labels(True, 22, 48) == ["25", "30", "35", "40", "45"]
+    assert labels(True, 0.7, 60) == ["1", "2", "5", "10", "20", "50"]
+    assert labels(True, 1, 2e4) == ["1", "10", "100", "1000", "10000"]
+    assert labels(False, 0, 9, 120) == ["0.0", "2.5", "5.0", "7.5"]
+    for low in (0.011, 1.1, 37.0, 4.4e5):
+        for factor in (1.02, 1.5, 2.5, 7.0, 40.0, 1e4, 1e12, 1e30):
+            shown = labels(True, low, low * factor)
+            assert 3 <= len(shown) <= 16, (low, factor, shown)
+            assert len(set(shown)) == len(shown)
+
+
+def test_thirty_curves_are_told_apart_and_named_whole(page):
+    look = page.value(
+        "(() => { const curves = Array.from({length: 30}, (_, k) => ({name: `CUB8, quarter, surface to surface ${k}`,"
+        " color: '', line: true, dash: false, x: [1, 2], y: [k, k + 1], notes: []}));"
+        " const chart = new Chart({id: 'many', title: '', curves, xtitle: 'x', ytitle: 'y', xlog: false, ylog: false});"
+        " const looks = chart.style.map((s) => JSON.stringify(s)), names = [...chart.legend.children].map((e) => e.textContent);"
+        " delete gibiane.charts.many; return [new Set(looks).size, names]; })()"
+    )
+    assert look == [30, [f"CUB8, quarter, surface to surface {k}" for k in range(30)]]
+
+
+def test_numbers_of_a_column_have_as_many_decimals(page):
+    shown = page.value(
+        "(() => { const node = BLOCKS.table({head: ['mu', 'error', 'St', 'n', 'word'], rows: [[0.01, 53.94881, 1e-5, 520, ''],"
+        " [0.5, 8.8, 0.01, 33280, '8.80'], [0.2, 0.0001234, 0, 16, 'glued']]});"
+        " const read = () => [...node.querySelectorAll('tbody tr')].map((r) => [...r.children].map((c) => c.textContent));"
+        " const first = read(); node.querySelectorAll('th')[4].click(); return [first, read().map((r) => r[4])]; })()"
+    )
+    assert shown[0] == [
+        ["0.01", "53.95", "1e-5", "520", ""],
+        ["0.50", "8.80", "0.01", "33280", "8.80"],
+        ["0.20", "1.2e-4", "0", "16", "glued"],
+    ]
+    assert shown[1] == ["8.80", "", "glued"]
+
+
+def test_the_wheel_scrolls_the_page_until_a_chart_is_clicked(page):
+    page.value("gibiane.open(1)")
+    box = page.value(
+        "(() => { const b = document.querySelector('.chart svg').getBoundingClientRect(); return [b.x, b.y]; })()"
+    )
+    before = page.value("gibiane.charts.cost.range")
+    wheel = {"x": box[0] + 300, "y": box[1] + 100, "deltaX": 0, "deltaY": -100}
+    page.mouse("mouseWheel", **wheel)
+    assert page.value("gibiane.charts.cost.range") == before
+    page.drag((wheel["x"], wheel["y"]), (wheel["x"], wheel["y"]))
+    page.mouse("mouseWheel", **wheel)
+    page.wait(f"gibiane.charts.cost.range.x[0] > {before['x'][0]}")
+
+
+def test_a_phone_has_letters_of_the_same_size_and_no_sideways_scroll(page):
+    try:
+        page.call("Emulation.setDeviceMetricsOverride", width=390, height=800, deviceScaleFactor=2, mobile=True)
+        for k in range(4):
+            page.value(f"gibiane.open({k})")
+            page.wait("document.documentElement.scrollWidth <= 390")
+        page.value("gibiane.open(1)")
+        page.wait("gibiane.charts.cost.width < 390")
+        ratio = page.value("gibiane.charts.cost.svg.getBoundingClientRect().width / gibiane.charts.cost.width")
+        assert ratio == pytest.approx(1.0, abs=0.02)
+    finally:
+        page.call("Emulation.clearDeviceMetricsOverride")
+
+
+def test_in_the_dark_papers_and_inks_change(page):
+    page.value("gibiane.open(2)")
+    page.wait("gibiane.views.block.camera.width > 100")
+    light = pixels(page)
+    try:
+        page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+        page.wait("theme.dark")
+        dark = pixels(page)
+        ink, paper = (page.value(f"getComputedStyle(document.body).{k}") for k in ("color", "backgroundColor"))
+    finally:
+        page.call("Emulation.setEmulatedMedia", features=[])
+    assert light[0, -1].min() > 0.99
+    assert dark[0, -1].max() < 0.2
+    assert [sum(map(int, re.findall(r"\d+", c)[:3])) for c in (ink, paper)] == [pytest.approx(690, abs=80), pytest.approx(77, abs=40)]
+
+
+def test_a_printed_report_has_every_page(page):
+    before = page.value("[...document.querySelectorAll('section')].map((s) => s.children.length)")
+    assert before[1:] == [1, 1, 1]
+    page.call("Page.printToPDF")
+    after = page.value("[...document.querySelectorAll('section')].map((s) => s.children.length)")
+    assert min(after) >= 2
+    assert page.value("[...document.querySelectorAll('section')].map((s) => s.hidden)") == [False, True, True, True]
+
+
 def test_one_changed_measure_moves_its_point_and_the_front(page, tmp_path):
     """The chart is drawn from the numbers of the script: 60 s becomes 4 s, and that point beats two others."""
 
     def seen():
         return page.value(
-            "gibiane.open(1) ?? [[...document.querySelectorAll('.chart circle[data-point]')]"
-            ".map((c) => Number(c.getAttribute('cx'))), gibiane.charts.cost.block.pareto]"
+            "gibiane.open(1) ?? [[...document.querySelectorAll('.chart [data-point]')]"
+            ".map((c) => c.getBoundingClientRect()).map((b) => b.x + b.width / 2), gibiane.charts.cost.block.pareto]"
         )
 
     places, front = seen()

@@ -1,9 +1,9 @@
 """Other codes on the two blocks: time, unknowns, and distance from the exact contact solution of the same mesh.
 
-usage: measure.py FILE.csv CASE...      CASE: T1_2 (see blocks.py), friction coefficient 0.2
+usage: measure.py FILE.csv CASE...      CASE: T1_2 (see blocks.py), friction coefficient 0.2; T1F_2: without friction
 
 Runs what is installed (CalculiX, GetFEM with the system's Python, scikit-fem with this one), says what is not, and adds one
-row a run to FILE.csv; a row of the same code, version and case is kept. Run it with the Python that runs Gibiane: the
+row a run to FILE.csv; a row of the same code, version, case and friction coefficient is kept. Run it with the Python that runs Gibiane: the
 exact solution of each mesh is Gibiane's own, whose energy and the energy of the difference are taken with `blocks.stiffness`.
 Columns: scene (ENTIER: 1 for T1), n, code (its number in CODES, from 1), seconds (mesh, matrix and solution; of CalculiX
 the whole process), ndof, energy (stress by strain, integrated, exact solution), gap (energy norm of the difference), mu,
@@ -75,13 +75,13 @@ def _debian(package):
     return done.stdout.strip() or "?"
 
 
-def exact(c):
+def exact(c, mu):
     """Return the nodes of both blocks and Gibiane's contact solution: points, upper, u."""
     from gibiane.session import Session
 
     out = io.StringIO()
     session = Session(out=out, err=out)
-    script = SCRIPT.format(nl=c["nl"], nu=c["nu"], a=c["a"], H=c["H"], mu=MU)
+    script = SCRIPT.format(nl=c["nl"], nu=c["nu"], a=c["a"], H=c["H"], mu=mu)
     if session.run_text(script) != 0:
         raise SystemExit(out.getvalue())
     lists = session.globals.names["L"]
@@ -101,14 +101,14 @@ def in_order(points, upper, u, xyz, top):
     return u[[number[key] for key in keys(xyz, top)]]
 
 
-def measure(c, code, command, folder):
+def measure(c, mu, code, command, folder):
     """Run a code once; return (seconds, unknowns, nodes, message); nodes None when it failed."""
     nodes = folder / "nodes.npz"
     nodes.unlink(missing_ok=True)
     arguments = {
-        "CalculiX N2S": [str(folder), c["name"], str(MU), "N2S"],
-        "CalculiX S2S": [str(folder), c["name"], str(MU), "S2S"],
-        "GetFEM integral": [c["name"], str(MU), "gwfl"],
+        "CalculiX N2S": [str(folder), c["name"], str(mu), "N2S"],
+        "CalculiX S2S": [str(folder), c["name"], str(mu), "S2S"],
+        "GetFEM integral": [c["name"], str(mu), "gwfl"],
         "scikit-fem tied": [c["name"]],
     }[code]
     environment = {"PATH": "/usr/local/bin:/usr/bin:/bin", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -146,28 +146,29 @@ def main(file, cases):
     now = [f"{code} {found[code][0]}" if code in found else f"{code} not installed" for code in CODES]
     kept = {i + 1 for i, line in enumerate(now) if line in before}
     rows = [row for row in rows if int(row["code"]) in kept]
-    done = {(row["scene"], row["n"], row["code"]) for row in rows}
+    done = {(row["scene"], row["n"], row["code"], float(row["mu"])) for row in rows}
     with tempfile.TemporaryDirectory() as folder:
         for name in cases:
-            c = case(name)
-            scene, n = name[1:].split("_")
-            missing = [code for code in found if (scene, n, str(CODES.index(code) + 1)) not in done]
+            mu = 0.0 if "F" in name else MU
+            c = case(name.replace("F", ""))
+            scene, n = c["name"][1:].split("_")
+            missing = [code for code in found if (scene, n, str(CODES.index(code) + 1), mu) not in done]
             if not missing:
                 continue
-            points, upper, u = exact(c)
+            points, upper, u = exact(c, mu)
             xyz, cl, cu, pairs, _, _ = joined(c, False)
             top = np.arange(len(xyz)) >= len(c["lower"][0])
             K = stiffness(c, xyz, cl, cu)
             u0 = in_order(points, upper, u, xyz, top).ravel()
             for code in missing:
-                seconds, ndof, nodes, message = measure(c, code, found[code][1], Path(folder))
+                seconds, ndof, nodes, message = measure(c, mu, code, found[code][1], Path(folder))
                 if nodes is None:
                     print(f"{name} {code}: {message}")
                     continue
                 d = in_order(*nodes, xyz, top).ravel() - u0
                 today = datetime.date.today()
                 values = (scene, n, CODES.index(code) + 1, f"{seconds:.4f}", ndof, f"{u0 @ (K @ u0):.12g}",
-                          f"{np.sqrt(d @ (K @ d)):.8g}", MU, today.year, today.month, today.day, 1)  # fmt: skip
+                          f"{np.sqrt(d @ (K @ d)):.8g}", mu, today.year, today.month, today.day, 1)  # fmt: skip
                 rows.append(dict(zip(COLUMNS, map(str, values), strict=True)))
                 print(f"{name} {code}: {seconds:.2f} s")
                 write(file, rows)

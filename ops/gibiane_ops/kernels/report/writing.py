@@ -16,7 +16,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.report.blocks import Block, Chart, Page, Picture, Table, Text, View, pareto_front
 
-SCRIPTS = ("base.js", "paint.js", "chart.js", "view.js")
+SCRIPTS = ("base.js", "axis.js", "paint.js", "chart.js", "view.js")
 
 
 def write_report(path: Path, title: str, subtitle: str, pages: Sequence[Page]) -> None:
@@ -64,6 +64,7 @@ def _html(title: str, subtitle: str, data: dict[str, Any]) -> str:
 <html lang="en">
 <head>
 <meta charset="utf-8">
+<meta name="color-scheme" content="light dark">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <link rel="icon" href="data:,">
 <title>{escape(title)}</title>

@@ -48,6 +48,43 @@ const tip = {
   },
 };
 
+// Colours of the screen: dark where the reader's system is, light on paper.
+const theme = {
+  dark: matchMedia("(prefers-color-scheme: dark)").matches,
+  get paper() {
+    return this.dark ? "#15191f" : "#ffffff";
+  },
+  // a colour that is seen on this paper: dark ones are made lighter on dark paper
+  ink(hex) {
+    const parts = [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16));
+    const light = 0.3 * parts[0] + 0.59 * parts[1] + 0.11 * parts[2], wanted = 135;
+    if (!this.dark || light >= wanted) return hex;
+    const t = (wanted - light) / (255 - light);
+    return `#${parts.map((v) => Math.round(v + t * (255 - v)).toString(16).padStart(2, "0")).join("")}`;
+  },
+  set(dark) {
+    this.dark = dark;
+    for (const each of [...Object.values(gibiane.charts), ...Object.values(gibiane.views)]) each.draw();
+  },
+};
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", (event) => theme.set(event.matches));
+
+// How the numbers of a column are written: with as many decimals for all, four digits of the largest.
+const columnStyle = (values) => {
+  const sizes = values.filter((v) => typeof v === "number" && v !== 0).map(Math.abs);
+  const high = Math.max(...sizes, 0), low = Math.min(...sizes, Infinity);
+  if (sizes.every(Number.isInteger) && high < 1e9) return String;
+  const middle = sizes.toSorted((a, b) => a - b)[sizes.length >> 1];
+  if (high >= 1e6 || high / middle > 1e3 || (high < 0.1 && high / low > 100)) return (v) => brief(v, 3);
+  const wanted = Math.max(0, 3 - Math.floor(Math.log10(high)));
+  const used = Math.max(...sizes.map((v) => (String(Number(v.toPrecision(10))).split(".")[1] ?? "").length));
+  const decimals = Math.min(wanted, used);
+  return (v) => (v !== 0 && Math.abs(v) < 0.995 * 10 ** -decimals ? brief(v, 2) : v.toFixed(decimals));
+};
+const NUMBER = /^[+-]?\d*\.?\d+(?:e[+-]?\d+)?$/i;
+// the value of a cell for sorting: words that spell a number (its digits were chosen by the script) are numbers
+const worth = (cell) => (typeof cell === "string" ? (NUMBER.test(cell.trim()) ? Number(cell) : NaN) : (cell ?? NaN));
+
 const VERDICTS = { OK: "good", VRAI: "good", STANDS: "good", FAIL: "bad", FAILED: "bad", ECHEC: "bad", FAUX: "bad" };
 
 const BLOCKS = {
@@ -56,26 +93,36 @@ const BLOCKS = {
   chart: (block) => new Chart(block).node,
   view: (block) => new View(block).node,
   table(block) {
-    const numeric = block.head.map((_, j) => block.rows.every((row) => typeof row[j] !== "string"));
+    const columns = block.head.map((_, j) => block.rows.map((row) => row[j]));
+    const numeric = columns.map((cells) => {
+      const filled = cells.filter((c) => c !== "" && c !== null);
+      return 2 * filled.filter((c) => Number.isFinite(worth(c))).length >= filled.length && filled.length > 0;
+    });
+    const styles = columns.map(columnStyle);
     const cell = (value, j) => {
-      if (typeof value !== "string") return make("td", { class: "number", title: String(value) }, brief(value, 5));
+      if (value === null) return make("td", { class: "number" }, "–");
+      if (typeof value !== "string") return make("td", { class: "number", title: String(value) }, styles[j](value));
       const kind = VERDICTS[value.trim().toUpperCase()];
-      return make("td", numeric[j] ? { class: "number" } : {}, kind ? make("span", { class: kind }, value) : value);
+      const style = numeric[j] ? "number" : value.length < 56 ? "short" : "";
+      return make("td", style ? { class: style } : {}, kind ? make("span", { class: kind }, value) : value.trim());
     };
     const body = make("tbody");
     const fill = (rows) => body.replaceChildren(...rows.map((row) => make("tr", {}, ...row.map(cell))));
     fill(block.rows);
-    const heads = block.head.map((name, j) =>
-      make("th", {
-        ...(numeric[j] ? { class: "number" } : {}), title: "sort",
-        onclick: () => {
-          const turn = heads[j].dataset.order === "1" ? -1 : 1;
-          heads.forEach((head) => delete head.dataset.order);
-          heads[j].dataset.order = turn;
-          const compare = (a, b) => (typeof a === "string" || typeof b === "string" ? String(a).localeCompare(String(b)) : a - b);
-          fill([...block.rows].sort((a, b) => turn * compare(a[j], b[j])));
-        },
-      }, name));
+    const compare = (a, b) => {
+      const [p, q] = [worth(a), worth(b)];
+      if (Number.isNaN(p) && Number.isNaN(q)) return String(a ?? "").localeCompare(String(b ?? ""));
+      return Number.isNaN(p) ? 1 : Number.isNaN(q) ? -1 : p - q;
+    };
+    const sort = (j) => {
+      const turn = heads[j].dataset.order === "1" ? -1 : 1;
+      heads.forEach((head) => delete head.dataset.order);
+      heads[j].dataset.order = turn;
+      fill([...block.rows].sort((a, b) => turn * compare(a[j], b[j])));
+    };
+    const heads = block.head.map((name, j) => make("th", {
+      ...(numeric[j] ? { class: "number" } : {}), title: "sort", tabindex: "0", onclick: () => sort(j), onkeydown: (event) => event.key === "Enter" && sort(j),
+    }, name));
     return make("div", { class: "scroll" }, make("table", {}, make("thead", {}, make("tr", {}, ...heads)), body));
   },
 };
@@ -90,8 +137,12 @@ const start = () => {
     [...nav.children].forEach((button, i) => button.setAttribute("aria-selected", String(i === k)));
     [...main.children].forEach((section, i) => (section.hidden = i !== k));
     tip.hide();
+    build(k);
+  };
+  // a page is built when it is first opened: a view needs its size
+  const build = (k) => {
     if (built.has(k)) return;
-    built.add(k); // a page is built when it is first opened: a view needs its size
+    built.add(k);
     for (const block of data.pages[k].blocks) {
       const parts = [];
       if (block.title) parts.push(make("h3", {}, block.title));
@@ -112,6 +163,21 @@ const start = () => {
     if (step && k >= 0) nav.children[(k + step + nav.children.length) % nav.children.length].focus();
   });
   gibiane.open = open;
+  // on paper every page is there, light
+  let dark = theme.dark;
+  window.addEventListener("beforeprint", () => {
+    dark = theme.dark;
+    data.pages.forEach((_, k) => {
+      main.children[k].classList.add("printed");
+      build(k);
+    });
+    Object.values(gibiane.views).forEach((view) => view.resize());
+    theme.set(false);
+  });
+  window.addEventListener("afterprint", () => {
+    [...main.children].forEach((section) => section.classList.remove("printed"));
+    theme.set(dark);
+  });
   const wanted = Number(location.hash.slice(1)) - 1;
   open(data.pages[wanted] ? wanted : 0);
 };

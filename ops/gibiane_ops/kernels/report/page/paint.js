@@ -27,6 +27,8 @@ void main() {
   ink = vec4(c, color.a);
 }`;
 
+// lines that no solid stands behind must be seen on dark paper
+const inked = (part) => (part.lines && !part.edge ? theme.ink(part.color) : part.color);
 const rgb = (hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
 
 class GlPainter {
@@ -50,7 +52,6 @@ class GlPainter {
     gl.depthFunc(gl.LEQUAL);
     gl.enable(gl.BLEND);
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.clearColor(1, 1, 1, 1);
     this.map = gl.createTexture();
   }
   load(parts) {
@@ -85,6 +86,7 @@ class GlPainter {
   draw(camera, factor, edges, glassy) {
     const gl = this.gl, at = this.at, canvas = gl.canvas;
     gl.depthMask(true); // or the depths of the last drawing would stay
+    gl.clearColor(...rgb(theme.paper), 1);
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniformMatrix3fv(at.axes, false, [0, 1, 2].flatMap((j) => camera.axes.map((axis) => axis[j])));
@@ -97,7 +99,7 @@ class GlPainter {
       const banded = part.banded && this.bands > 0 && part.buffers.value;
       gl.uniform1f(at.factor, part.moved ? factor : 0);
       gl.uniform1f(at.lift, part.lines ? 0.0012 : 0);
-      gl.uniform4f(at.color, ...rgb(part.color), part.banded && glassy ? 0.3 : (part.opacity ?? 1));
+      gl.uniform4f(at.color, ...rgb(inked(part)), part.banded && glassy ? 0.3 : (part.opacity ?? 1));
       gl.depthMask(!(part.banded && glassy));
       gl.uniform1f(at.bands, banded ? this.bands : 0);
       gl.uniform1f(at.lit, part.lines ? 0 : 1);
@@ -143,7 +145,7 @@ class PlainPainter {
   }
   draw(camera, factor, edges, glassy) {
     const pen = this.pen, { width, height } = this.canvas, ratio = width / camera.width;
-    pen.fillStyle = "#fff";
+    pen.fillStyle = theme.paper;
     pen.fillRect(0, 0, width, height);
     const shapes = [];
     for (const part of this.parts) {
@@ -157,7 +159,7 @@ class PlainPainter {
           corners.push(c);
           deep += c[2] / size;
         }
-        let color = part.color;
+        let color = inked(part);
         if (part.banded && part.value && this.list.length) {
           const t = (part.value[i] + part.value[i + 1] + part.value[i + 2]) / 3;
           color = t < -0.5 ? "#c8c8c8" : this.list[Math.max(0, Math.min(this.list.length - 1, Math.floor(t * this.list.length)))];

@@ -1,5 +1,5 @@
 "use strict";
-// A mesh with its fields: drag to turn, wheel to zoom, right button or shift to move; the pointer reads values.
+// A mesh with its fields: drag to turn, click and turn the wheel to zoom, right button or shift to move; the pointer reads values.
 const TURBO = ["#4143a7", "#4669e0", "#458cfd", "#31aff5", "#1ccdd8", "#1ce6b4", "#3ff68a", "#75fe5c", "#a4fc3c", "#c6f034", "#e5d938", "#f9bc39", "#fe992c", "#f8721c", "#e84b0c", "#d02f05", "#af1801"];
 const shade = (t) => {
   const s = t * (TURBO.length - 1), k = Math.min(Math.floor(s), TURBO.length - 2), [a, b] = [rgb(TURBO[k]), rgb(TURBO[k + 1])];
@@ -87,15 +87,26 @@ class View {
     const canvas = () => make("canvas");
     this.bar = make("div", { class: "bar" });
     this.stage = make("div", { class: "stage", tabindex: "0" }, canvas());
-    try {
-      this.painter = new GlPainter(this.stage.firstChild);
-      this.drawnBy = "webgl2";
-    } catch (reason) {
+    const plain = () => {
       this.stage.firstChild.replaceWith(canvas()); // a canvas keeps its first kind of context
-      this.painter = new PlainPainter(this.stage.firstChild);
+      this.canvas = this.stage.firstChild;
+      this.painter = new PlainPainter(this.canvas);
       this.drawnBy = "canvas";
-    }
+    };
     this.canvas = this.stage.firstChild;
+    try {
+      this.painter = new GlPainter(this.canvas);
+      this.drawnBy = "webgl2";
+      // a browser takes contexts away from the oldest of many views
+      this.canvas.addEventListener("webglcontextlost", () => {
+        plain();
+        this.painter.load(this.parts);
+        this.show(this.shown);
+        this.resize();
+      });
+    } catch (reason) {
+      plain();
+    }
     this.over = make("canvas", { class: "over" });
     this.stage.append(this.over, this.bar);
     if (this.arrows.length)
@@ -141,7 +152,7 @@ class View {
       });
       bar.append(make("label", {}, slider, label));
     }
-    bar.append(make("span", {}, "drag: turn · wheel: zoom · right button: move · pointer: values"));
+    bar.append(make("span", {}, "drag: turn · click, then wheel: zoom · right button: move · pointer: values"));
     return bar;
   }
   // a field by its number: new colours and a new legend
@@ -330,6 +341,7 @@ class View {
     });
     stage.addEventListener("pointerleave", () => tip.hide());
     stage.addEventListener("wheel", (event) => {
+      if (!(event.ctrlKey || document.activeElement === stage)) return; // a reader who scrolls down the page
       event.preventDefault();
       const box = stage.getBoundingClientRect(), f = event.deltaY > 0 ? 1 / 1.15 : 1.15;
       const at = [event.clientX - box.left - box.width / 2, box.height / 2 - (event.clientY - box.top)];
