@@ -226,11 +226,17 @@ def _info(options: dict[str, Any], names: list[str]) -> int:
 
 
 def _docs(options: dict[str, Any], files: list[str]) -> int:
+    from gibiane import cast3m
     from gibiane.notice import markdown
 
-    _session(options, [])
+    session = _session(options, [])
+    missing = {
+        name: near
+        for name, near in cast3m.names().items()
+        if session.operator(name) is None and session.library.find(name) is None
+    }
     path = Path(files[0] if files else "OPERATORS.md")
-    text = markdown()
+    text = markdown(missing)
     if options.get("check"):
         fresh = path.is_file() and path.read_text(encoding="utf-8") == text
         sys.stdout.write(f"{path} is {'fresh' if fresh else 'stale: run `gibiane docs`'}\n")

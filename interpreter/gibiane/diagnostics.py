@@ -175,7 +175,7 @@ def render(diag: Diagnostic, *, colour: bool = False, lang: str = "en") -> str:
         margin = " " * len(str(max(label.span.line for label in labels)))
         lines.append(f"{margin}{paint('-->', 'blue')} {diag.span.source.name}:{diag.span.line}:{diag.span.column}")
         lines.extend(_excerpt(labels, margin, lang, paint))
-    lines.extend(f"{margin} {paint('=', 'blue')} {word('form')}: {form}" for form in diag.forms)
+    lines.extend(f"{margin} {paint('=', 'blue')} {word('form')}: {shortened(form)}" for form in diag.forms)
     for note in diag.notes:
         lines.append(f"{margin} {paint('=', 'blue')} {word('note')}: {note.render(lang)}")
     if diag.hint:
@@ -198,6 +198,37 @@ def _calls(trace: list[tuple[str, Span]]) -> list[str]:
             counted.append([where, 1])
     shown = [where if count == 1 else f"{where} x {count}" for where, count in counted]
     return shown if len(shown) <= 12 else [*shown[:6], "...", *shown[-5:]]
+
+
+LONGEST = 110  # columns of a form of an operator that are shown
+
+
+def shortened(form: str, width: int = LONGEST) -> str:
+    """Return a form of an operator no wider than `width`: its last optional operands left out, "..." for them.
+
+    Of the first one left out, a choice of keywords, those stay that have room. What is not optional stays.
+    """
+    parts: list[str] = []
+    for piece in form.removesuffix(" ;").split(" "):
+        if parts and parts[-1].count("(") > parts[-1].count(")"):
+            parts[-1] += " " + piece
+        else:
+            parts.append(piece)
+    if len(form) <= width:
+        return form
+    out, at = "", len(parts)
+    while len(" ".join(parts)) + len(" ... ;") > width:
+        last = next((i for i in range(len(parts) - 1, -1, -1) if parts[i].startswith("(")), None)
+        if last is None:
+            break
+        out, at = parts.pop(last), last
+    choices = out.strip("()").split("|") if " " not in out else []
+    room = width - len(" ".join(parts)) - len(" (|...) ... ;")
+    while choices and len("|".join(choices)) > room:
+        choices.pop()
+    if len(choices) > 1:
+        parts.insert(at, f"({'|'.join(choices)}|...)")
+    return " ".join([*parts, "... ;"])
 
 
 WIDEST = 160  # columns of a source line that are shown; of a longer one, what stands round the place

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 from gibiane import cast3m, registry
@@ -86,8 +87,11 @@ def operators() -> list[Operator]:
     return sorted(found.values(), key=lambda op: (op.topic, op.name))
 
 
-def markdown() -> str:
-    """Return OPERATORS.md: every operator with its forms, keywords and example."""
+def markdown(missing: Mapping[str, str]) -> str:
+    """Return OPERATORS.md: every operator with its forms, keywords and example.
+
+    `missing` holds the names of Cast3M that are not here, each with what is nearest, or "".
+    """
     lines = ["# Operators", "", "Made from the declarations by `gibiane docs`; do not edit.", ""]
     ops = operators()
     topics = sorted({op.topic for op in ops})
@@ -99,7 +103,22 @@ def markdown() -> str:
         for op in ops:
             if op.topic == topic:
                 lines.extend(_section(op))
+    lines.extend(_missing(missing))
     return "\n".join(lines) + "\n"
+
+
+def _missing(names: Mapping[str, str]) -> list[str]:
+    """List the names of Cast3M that are not here: operators first, of at most four letters, then procedures."""
+    lines = ["", "## Not here", "", f"Of Cast3M 2024, {len(names)} names are not here; calling one gives error 251."]
+    near = sorted(name for name, text in names.items() if text)
+    lines += ["", "| name | nearest here |", "| --- | --- |", *(f"| {name} | {names[name]} |" for name in near)]
+    listed = list(names)
+    first = next((i for i, name in enumerate(listed) if len(name) > 4), len(listed))
+    for kind, part in (("operators", listed[:first]), ("procedures", listed[first:])):
+        words = [f"`{name}`" for name in sorted(part) if not names[name]]
+        wrapped = textwrap.wrap(" ".join(words), 120, break_on_hyphens=False)
+        lines += ["", f"With nothing near them, {kind} ({len(words)}):", "", *wrapped]
+    return lines
 
 
 _SYMBOLS = {

@@ -166,9 +166,9 @@ def _spread(
             missing.append(number)
         else:
             results.set(number, values)
-    progress.begin(missing)
     if expected is not None:
         missing.sort(key=lambda number: -expected[number])
+    progress.begin(missing)
     failed: list[tuple[int, Answer]] = []
     texts: dict[int, str] = {}
     following = iter(sorted(missing))

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 
 from gibiane.registry import Context
+from gibiane_ops.assistants.forecast import Forecast
 
 EVERY = 30.0  # seconds between two lines of a listing that is no terminal
 
@@ -28,41 +29,42 @@ class Progress:
     def __init__(self, ctx: Context, total: int, expected: Sequence[float] | None, workers: int) -> None:
         self.ctx = ctx
         self.total = total
-        self.expected = expected
+        self.forecast = None if expected is None else Forecast(expected)
         self.workers = max(1, workers)
-        self.missing: set[int] = set()
+        self.missing: list[int] = []
         self.count = self.old = 0
-        self.work = self.done_work = self.done_seconds = 0.0
         self.start = self.last = time.perf_counter()
         self.terminal = sys.stderr.isatty() and ctx.session.err is sys.stderr
         self.listed = int(ctx.option("ECHO")) >= 1
         self.slow = expected is not None and not self.terminal and not self.listed and ctx.session.err is sys.stderr
 
     def begin(self, missing: Sequence[int]) -> None:
-        """Note which cases are to be done, and say how long they will take."""
-        self.missing = set(missing)
+        """Note which cases are to be done, in their order, and say how long they will take."""
+        self.missing = list(missing)
         self.count = self.old = self.total - len(missing)
         if self.old:
             self._tell(f" ASSI : {self.old} of {self.total} cases were done before")
-        if self.expected is not None and missing:
-            self.work = sum(self.expected[number] for number in missing)
+        if self.forecast is not None and missing:
             self._tell(f" ASSI : {len(missing)} cases to do, about {span(self.left())} on {self.workers} process(es)")
 
     def left(self) -> float:
         """Return the seconds ahead: what was expected, corrected by what the finished cases took."""
-        elapsed = time.perf_counter() - self.start
-        if self.expected is None:
+        if self.count >= self.total:
+            return 0.0
+        if self.forecast is None:
+            elapsed = time.perf_counter() - self.start
             return elapsed / max(1, self.count - self.old) * (self.total - self.count)
-        ratio = self.done_seconds / self.done_work if self.done_work else 1.0
-        workers = min(self.workers, max(1, len(self.missing)))
-        return max(0.0, ratio * self.work / workers - elapsed) if self.count < self.total else 0.0
+        ahead = self.forecast.of(self.missing)
+        # when a case ends, the other workers are on their way through the next ones: half done, on the average
+        begun = 0.5 * float(ahead[: self.workers - 1].sum()) if self.count > self.old else 0.0
+        return max((float(ahead.sum()) - begun) / self.workers, 0.5 * float(ahead.max()))
 
     def done(self, number: int, seconds: float) -> None:
         """Note that a case is finished."""
         self.count += 1
-        if self.expected is not None:
-            self.done_work += self.expected[number]
-            self.done_seconds += seconds
+        self.missing.remove(number)
+        if self.forecast is not None:
+            self.forecast.done(number, seconds)
         now = time.perf_counter()
         if self.slow and now - self.last < EVERY and self.count < self.total:
             return
