@@ -194,7 +194,9 @@ def test_axes_have_round_ticks_and_never_one_alone(page):
     """A short logarithmic range holds no power of ten and perhaps one of 1, 2, 5."""
 
     def labels(log, low, high, length=400):
-        return page.value(f"new Axis({str(log).lower()}, {low}, {high}, {length}, 0).ticks(26).map((t) => t[1]).filter(Boolean)")
+        return page.value(
+            f"new Axis({str(log).lower()}, {low}, {high}, {length}, 0).ticks(26).map((t) => t[1]).filter(Boolean)"
+        )
 
     assert labels(True, 22, 48) == ["25", "30", "35", "40", "45"]
     assert labels(True, 0.7, 60) == ["1", "2", "5", "10", "20", "50"]
@@ -212,7 +214,8 @@ def test_thirty_curves_are_told_apart_and_named_whole(page):
         "(() => { const curves = Array.from({length: 30}, (_, k) => ({name: `CUB8, quarter, surface to surface ${k}`,"
         " color: '', line: true, dash: false, x: [1, 2], y: [k, k + 1], notes: []}));"
         " const chart = new Chart({id: 'many', title: '', curves, xtitle: 'x', ytitle: 'y', xlog: false, ylog: false});"
-        " const looks = chart.style.map((s) => JSON.stringify(s)), names = [...chart.legend.children].map((e) => e.textContent);"
+        " const looks = chart.style.map((s) => JSON.stringify(s));"
+        " const names = [...chart.legend.children].map((e) => e.textContent);"
         " delete gibiane.charts.many; return [new Set(looks).size, names]; })()"
     )
     assert look == [30, [f"CUB8, quarter, surface to surface {k}" for k in range(30)]]
@@ -220,9 +223,10 @@ def test_thirty_curves_are_told_apart_and_named_whole(page):
 
 def test_numbers_of_a_column_have_as_many_decimals(page):
     shown = page.value(
-        "(() => { const node = BLOCKS.table({head: ['mu', 'error', 'St', 'n', 'word'], rows: [[0.01, 53.94881, 1e-5, 520, ''],"
-        " [0.5, 8.8, 0.01, 33280, '8.80'], [0.2, 0.0001234, 0, 16, 'glued']]});"
-        " const read = () => [...node.querySelectorAll('tbody tr')].map((r) => [...r.children].map((c) => c.textContent));"
+        "(() => { const node = BLOCKS.table({head: ['mu', 'error', 'St', 'n', 'word'],"
+        " rows: [[0.01, 53.94881, 1e-5, 520, ''], [0.5, 8.8, 0.01, 33280, '8.80'], [0.2, 0.0001234, 0, 16, 'glued']]});"
+        " const texts = (r) => [...r.children].map((c) => c.textContent);"
+        " const read = () => [...node.querySelectorAll('tbody tr')].map(texts);"
         " const first = read(); node.querySelectorAll('th')[4].click(); return [first, read().map((r) => r[4])]; })()"
     )
     assert shown[0] == [
@@ -274,7 +278,10 @@ def test_in_the_dark_papers_and_inks_change(page):
         page.call("Emulation.setEmulatedMedia", features=[])
     assert light[0, -1].min() > 0.99
     assert dark[0, -1].max() < 0.2
-    assert [sum(map(int, re.findall(r"\d+", c)[:3])) for c in (ink, paper)] == [pytest.approx(690, abs=80), pytest.approx(77, abs=40)]
+    assert [sum(map(int, re.findall(r"\d+", c)[:3])) for c in (ink, paper)] == [
+        pytest.approx(690, abs=80),
+        pytest.approx(77, abs=40),
+    ]
 
 
 def test_a_printed_report_has_every_page(page):

@@ -20,10 +20,10 @@ class Forecast:
 
     Notes
     -----
-    What a case takes is ``expected * exp(a + b (log(expected) - m)) * noise``, with `m` the mean of the logarithms weighted by
-    the times expected; `a` and `b` are normal with deviations `LEVEL` and `SLOPE`, the noise is log-normal with `SPREAD`. The
-    cases done give the means of `a` and `b`; one factor then makes their sum right. The longest cases begin, so a plain ratio
-    of seconds to expectations would carry what is wrong with those to all small ones.
+    What a case takes is ``expected * exp(a + b (log(expected) - m)) * noise``, with `m` the mean of the logarithms
+    weighted by the times expected; `a` and `b` are normal with deviations `LEVEL` and `SLOPE`, the noise is log-normal
+    with `SPREAD`. The cases done give the means of `a` and `b`; one factor then makes their sum right. The longest
+    cases begin, so a plain ratio of seconds to expectations would carry what is wrong with those to all small ones.
 
     Source
     ------

@@ -9,7 +9,8 @@ def test_a_short_form_stands_as_it_is():
 
 
 def test_the_last_optional_operands_of_a_wide_form_are_left_out():
-    form = "CHPOINT = RESO k:RIGIDITE (prec:FLOTTANT) ('PENA'|'UZAW' r:FLOTTANT) ('STATUT' (sn:FLOTTANT)) ('SOUC') f:CHPOINT ;"
+    form = "CHPOINT = RESO k:RIGIDITE (prec:FLOTTANT) ('PENA'|'UZAW' r:FLOTTANT) ('STATUT' (sn:FLOTTANT)) ('SOUC') "
+    form += "f:CHPOINT ;"
     assert shortened(form, 80) == "CHPOINT = RESO k:RIGIDITE (prec:FLOTTANT) f:CHPOINT ... ;"
     assert shortened(form, 20) == "CHPOINT = RESO k:RIGIDITE f:CHPOINT ... ;"
 

@@ -1,5 +1,8 @@
 """The time ahead of a study: what was expected, corrected by what the finished cases took."""
 
+import io
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -51,15 +54,12 @@ def test_the_rest_is_foretold_when_the_longest_quarter_of_the_time_is_over(power
 class Context:
     """What Progress asks of the place that it runs in."""
 
-    class session:
-        err = None
+    def __init__(self):
+        self.lines = []
+        self.session = SimpleNamespace(err=io.StringIO())
 
     def option(self, name):
         return 1
-
-    def __init__(self):
-        self.lines = []
-        self.session.err = type("Err", (), {"flush": lambda self: None})()
 
     def write(self, line):
         self.lines.append(line)
