@@ -66,4 +66,4 @@ class Forecast:
         a, b = np.linalg.solve(H, A.T @ np.log(seconds / self.expected[done]) / SPREAD**2)
         model = self.expected * np.exp(a + b * self.x)
         share = model[wanted].mean() if len(wanted) else 0.0
-        return model[wanted] * (seconds.sum() + share) / (model[done].sum() + share)
+        return np.asarray(model[wanted] * (seconds.sum() + share) / (model[done].sum() + share), np.float64)
