@@ -284,12 +284,19 @@ def test_in_the_dark_papers_and_inks_change(page):
     ]
 
 
-def test_a_printed_report_has_every_page(page):
-    before = page.value("[...document.querySelectorAll('section')].map((s) => s.children.length)")
-    assert before[1:] == [1, 1, 1]
+def test_a_printed_report_has_every_page_and_its_views(page):
+    inside = "[...document.querySelectorAll('section')].map((s) => s.children.length)"
+    assert page.value(inside)[1:] == [1, 1, 1]
+    # what is there when it is printed, for the file itself cannot be read without a further package
+    page.value(
+        "window.addEventListener('beforeprint', () => { gibiane.printed = "
+        "[[...document.querySelectorAll('section')].map((s) => s.hidden), gibiane.views.block.over.toDataURL()]; })"
+    )
     page.call("Page.printToPDF")
-    after = page.value("[...document.querySelectorAll('section')].map((s) => s.children.length)")
-    assert min(after) >= 2
+    shown, drawn = page.value("gibiane.printed")
+    assert shown == [False] * 4
+    assert min(page.value(inside)) >= 2
+    assert (picture(drawn)[..., :3].min(axis=2) < 0.97).mean() > 0.05
     assert page.value("[...document.querySelectorAll('section')].map((s) => s.hidden)") == [False, True, True, True]
 
 
@@ -347,14 +354,18 @@ def test_a_view_turns_and_gives_back_computed_values(page):
     assert after != before
 
 
-def pixels(page, name="block"):
-    """Read the canvas of a view: (height, width, 3), from the picture that it gives."""
+def picture(url):
+    """Read the picture of a data URL: (height, width, 4)."""
     import io
 
     import matplotlib.image
 
-    data = page.value(f"gibiane.views['{name}'].canvas.toDataURL()").partition(",")[2]
-    return matplotlib.image.imread(io.BytesIO(base64.b64decode(data)))[..., :3]
+    return matplotlib.image.imread(io.BytesIO(base64.b64decode(url.partition(",")[2])))
+
+
+def pixels(page, name="block"):
+    """Read the canvas of a view: (height, width, 3), from the picture that it gives."""
+    return picture(page.value(f"gibiane.views['{name}'].canvas.toDataURL()"))[..., :3]
 
 
 def test_a_view_is_painted_in_the_colours_of_its_legend_with_its_arrows(page):

@@ -136,6 +136,7 @@ const start = () => {
   const open = (k) => {
     [...nav.children].forEach((button, i) => button.setAttribute("aria-selected", String(i === k)));
     [...main.children].forEach((section, i) => (section.hidden = i !== k));
+    nav.scrollLeft = nav.children[k].offsetLeft - nav.offsetLeft - 40; // a phone has the tabs in one row
     tip.hide();
     build(k);
   };
@@ -164,19 +165,21 @@ const start = () => {
   });
   gibiane.open = open;
   // on paper every page is there, light
-  let dark = theme.dark;
+  let before = null;
   window.addEventListener("beforeprint", () => {
-    dark = theme.dark;
-    data.pages.forEach((_, k) => {
-      main.children[k].classList.add("printed");
+    before ??= { dark: theme.dark, hidden: [...main.children].map((section) => section.hidden) };
+    [...main.children].forEach((section, k) => {
+      section.hidden = false;
       build(k);
     });
-    Object.values(gibiane.views).forEach((view) => view.resize());
     theme.set(false);
+    Object.values(gibiane.views).forEach((view) => view.forPaper());
   });
   window.addEventListener("afterprint", () => {
-    [...main.children].forEach((section) => section.classList.remove("printed"));
-    theme.set(dark);
+    if (!before) return;
+    [...main.children].forEach((section, k) => (section.hidden = before.hidden[k]));
+    theme.set(before.dark);
+    before = null;
   });
   const wanted = Number(location.hash.slice(1)) - 1;
   open(data.pages[wanted] ? wanted : 0);

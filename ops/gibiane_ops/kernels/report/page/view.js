@@ -208,6 +208,15 @@ class View {
     this.painter.draw(this.camera, this.factor, this.withEdges, this.glassy);
     this.triad();
   }
+  // printers see what WebGL drew only through a plain canvas
+  forPaper() {
+    this.resize();
+    const pen = this.over.getContext("2d");
+    pen.setTransform(1, 0, 0, 1, 0, 0);
+    pen.globalCompositeOperation = "destination-over";
+    pen.drawImage(this.canvas, 0, 0);
+    pen.globalCompositeOperation = "source-over";
+  }
   triad() {
     const pen = this.over.getContext("2d"), ratio = this.over.width / this.camera.width;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
