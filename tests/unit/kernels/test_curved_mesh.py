@@ -93,6 +93,8 @@ def test_cubics_pass_where_they_must() -> None:
     assert np.allclose((h.at(np.array([1e-7])) - p[0]) / 1e-7, p[1], atol=1e-5)
     tip = curves.parabola(p[0], p[1], p[2])
     assert np.allclose(np.cross(tip.at(np.array([1e-7]))[0] - p[0], p[1] - p[0]), 0, atol=1e-11)
+    # halfway it is halfway between its tip and the middle of its ends
+    assert np.allclose(tip.at(np.array([0.0, 0.5, 1.0])), [p[0], (p[0] + 2 * p[1] + p[2]) / 4, p[2]], atol=1e-12)
     with pytest.raises(BadValue):
         curves.cubic_through(p[[0, 0, 1, 2]])
 
