@@ -8,7 +8,7 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, TABLE, Table
 from gibiane_ops.kernels import geometry
-from gibiane_ops.kernels.adapt import degrees, moving
+from gibiane_ops.kernels.adapt import degrees, moving, shares
 from gibiane_ops.kernels.adapt.orders import singular_orders
 from gibiane_ops.kernels.adapt.sizes import element_sizes, nodal_sizes
 from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
@@ -23,6 +23,7 @@ from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.material import MATERIAL, on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import node_store
+from gibiane_ops.values.results import wanted_results
 from gibiane_ops.values.sizing import coincident, error_map, prescribed
 
 TAIL = extend("TAILLE")
@@ -36,13 +37,23 @@ WORKING = 1e-8
     Arg("carte", MCHAML, "map of relative errors"),
     Arg("model", MMODEL, "model"),
     Arg("smooth", MCHAML, "smoothed stress at nodes (LISSER)"),
+    Arg("sig", MCHAML, "stress at stress points", optional=True),
     Key("PREC", "prescribed relative error (needed)", Arg("e0", FLOTTANT)),
     Key("SEUL", "raise only, divide nothing"),
-    gives=[CHPOINT, MCHAML, FLOTTANT],
+    Key("NBMA", "number of elements", Arg("n", FLOTTANT)),
+    gives=[CHPOINT, MCHAML, FLOTTANT, "(FLOTTANT)"],
 )
 def _degrees(
-    ctx: Context, degre: bool, carte: MChaml, model: Modele, smooth: MChaml, prec: float | None, seul: bool
-) -> tuple[ChPoint, MChaml, float]:
+    ctx: Context,
+    degre: bool,
+    carte: MChaml,
+    model: Modele,
+    smooth: MChaml,
+    sig: MChaml | None,
+    prec: float | None,
+    seul: bool,
+    nbma: float | None,
+) -> tuple[ChPoint, MChaml, float] | tuple[ChPoint, MChaml, float, float]:
     target = prescribed(ctx, prec)
     store = node_store(ctx)
     zones = solid_zones(ctx, model)
@@ -61,12 +72,15 @@ def _degrees(
         )
         size = np.concatenate([element_sizes(shape(n), m) for (n, _), m in zip(blocks, measures, strict=True)])
         peak = order < degree
-        left = degrees.left_by_degree(size, degrees.smoothness(points, blocks, stress), peak)
+        left = shares.left_by_degree(size, shares.smoothness(points, blocks, stress), peak)
+        if sig is not None:
+            start = 0
+            for zone, (name, cells), values in zip(zones, blocks, stress, strict=True):
+                if shape(name).degree == 2:
+                    own = on_zone(ctx, sig, zone, "sig").values
+                    left[start : start + len(cells)] = shares.left_measured(shape(name), points[cells], values, own)
+                start += len(cells)
         may_rise = np.ones(len(degree), bool)
-        if pairs is not None:  # contacts pair corner by corner: REMAILLER keeps them linear
-            paired = np.zeros(len(points), bool)
-            paired[pairs] = True
-            may_rise &= ~degrees.with_facet_on(blocks, paired)
         low = [(LINEAR.get(n, n), c) for n, c in blocks]
         high = [(QUADRATIC.get(n, n), c) for n, c in low]
         may_rise &= np.concatenate([np.full(len(c), n in QUADRATIC) for n, c in low])
@@ -79,6 +93,7 @@ def _degrees(
                 error**2, target, left=left, added=np.maximum(cost[1] - cost[0], 1.0), may_rise=may_rise & ~now
             )
             quadratic, nodal = now | rows, nodal_sizes(len(points), blocks, size, pairs=pairs)
+            count = float(len(size))
         else:
             error2 = np.where(now, np.stack([error**2 / left, error**2]), np.stack([error**2, error**2 * left]))
             choices = degrees.Choices(
@@ -87,15 +102,16 @@ def _degrees(
                 cost,
                 np.stack([np.ones(len(now), bool), may_rise]),
             )
-            nodal, found = degrees.degree_map(points, blocks, size, choices, target, pairs=pairs)
-            quadratic, predicted = found.quadratic, found.predicted
+            sizes, quadratic = degrees.degree_map(points, blocks, choices, target, pairs=pairs, max_count=nbma)
+            nodal, predicted, count = sizes.nodal, sizes.reachable, float(sizes.count)
     marks = []
     start = 0
     for zone, (_, cells) in zip(zones, blocks, strict=True):
         rows = quadratic[start : start + len(cells)]
         start += len(cells)
         marks.append(ChamZone(zone, [SCAL], rows.astype(np.float64)[:, None, None]))
-    return ChPoint(store, {SCAL: (nodes, nodal)}, DIFFUS), MChaml(marks, MATERIAL, "GRAVITE"), predicted
+    found = ChPoint(store, {SCAL: (nodes, nodal)}, DIFFUS), MChaml(marks, MATERIAL, "GRAVITE"), predicted
+    return (*found, count) if wanted_results(ctx) > 3 else found
 
 
 def _numbered(zones: list[ModelZone]) -> tuple[IntArray, list[tuple[str, IntArray]]]:

@@ -7,7 +7,7 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, MCHAML, MMODEL
-from gibiane_ops.kernels.estimate.contact import densities
+from gibiane_ops.kernels.estimate.contact import densities, with_following
 from gibiane_ops.values.champs import DIFFUS, ChPoint, MChaml
 from gibiane_ops.values.conditions import family
 from gibiane_ops.values.contact import solved_contacts
@@ -72,8 +72,12 @@ def _cofr(ctx: Context, mc: Modele, u: ChPoint, rea: ChPoint, matc: MChaml | Non
         }
         if dim == 3:
             values |= {"PT2": local[:, 2], "GT2": zone.relative[:, 2]}
+        every, follow = with_following(zone.zone.slave.kernel_blocks, nodes)
         for name, value in values.items():
-            columns.setdefault(name, []).append((nodes, value))
+            at = follow @ value
+            if name == "ETAT":  # the first and the last entry of a row: its node, or two corners
+                at = np.maximum(value[follow.indices[follow.indptr[:-1]]], value[follow.indices[follow.indptr[1:] - 1]])
+            columns.setdefault(name, []).append((every, at))
     parts = {
         name: (np.concatenate([n for n, _ in pieces]), np.concatenate([v for _, v in pieces]))
         for name, pieces in columns.items()

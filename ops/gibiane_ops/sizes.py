@@ -40,8 +40,11 @@ TAIL = operator(
     "elements; 'MINN' takes at a node the smallest size around it rather than their geometric mean. `CHD NB = TAILLE "
     "...` also gives the number of elements that the sizes ask for. `CHM = TAILLE 'METRIQUE' U MODL 'NBMA' n`: the "
     "metric (G11 G21 G22, in space G31 G32 G33) of n simplices on which the field U is interpolated best, long where "
-    "it varies little; 'ALLO' bounds how long. Nodes at one place in two solids (contact) get "
-    "one size.",
+    "it varies little; 'ALLO' bounds how long. `CHD MARQ EP (NB) = TAILLE 'DEGRE' CARTE MODL SIGL (SIG) 'PREC' e0`: "
+    "sizes, elements to raise to the second degree (1) or not (0), and the error expected; SIGL is the smoothed "
+    "stress, SIG that of the solution, from which what quadratic elements gain is measured (else predicted); "
+    "'NBMA' bounds the number of elements, EP is then what they reach; 'SEUL' divides nothing. Nodes at one place in "
+    "two solids (contact) get one size.",
     example="""
     OPTI DIME 2 ELEM TRI3 MODE PLAN DEFO ;
     S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ;

@@ -270,8 +270,30 @@ def middles(blocks: Sequence[Block]) -> IntArray:
     local = [(cells, np.array(shape(name).edges)) for name, cells in blocks if shape(name).degree == 2]
     every = np.concatenate([np.zeros((0, 3), np.int64), *(cells[:, edges].reshape(-1, 3) for cells, edges in local)])
     _, first = np.unique(every[:, 2], return_index=True)
-    corners = np.concatenate([cells.ravel() for _, cells in corner_blocks(blocks)])
+    corners = np.concatenate([np.zeros(0, np.int64), *(cells.ravel() for _, cells in corner_blocks(blocks))])
     return np.asarray(every[first][~np.isin(every[first, 2], corners)], np.int64)
+
+
+def middles_on_linear(blocks: Sequence[Block]) -> IntArray:
+    """Find the mid-nodes of quadratic cells whose edge is also that of a linear cell.
+
+    Parameters
+    ----------
+    blocks : sequence of (str, (m, n_nodes) int64)
+
+    Returns
+    -------
+    (k, 3) int64
+        The two ends, then the mid-node, by increasing mid-node.
+    """
+    quadratic = middles(blocks)
+    ends = edges([(name, cells) for name, cells in blocks if shape(name).degree == 1])
+    if not len(quadratic) or not len(ends):
+        return quadratic[:0]
+    n = np.int64(max(quadratic.max(), ends.max()) + 1)
+    pair = np.sort(quadratic[:, :2], axis=1)
+    beside = np.isin(pair[:, 0] * n + pair[:, 1], ends[:, 0] * n + ends[:, 1])
+    return np.asarray(quadratic[beside], np.int64)
 
 
 def node_to_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[IntArray, IntArray]:

@@ -10,6 +10,7 @@ import numpy as np
 from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels.adapt.contact_degrees import paired_degrees
 from gibiane_ops.kernels.adapt.hanging import hanging_nodes
 from gibiane_ops.kernels.adapt.hierarchy import Hierarchy, LocalMesh, adapted, faces_in_order, founded
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
@@ -223,19 +224,16 @@ def _inherited(name: str, before: LocalMesh, mesh: LocalMesh, degree: IntArray) 
 
 
 def _raisable(name: str, mesh: LocalMesh, degree: IntArray) -> IntArray:
-    """Keep linear the elements that touch a contact, whose faces pair node by node, or that hanging nodes touch."""
+    """Keep linear the elements that hanging nodes touch, and give the two sides of a contact one degree."""
     if (degree == 1).all():
         return degree
-    on = np.zeros(len(mesh.points), bool)
-    on[np.concatenate([np.zeros(0, np.int64), *(each.ravel() for each in mesh.pairs)])] = True
-    whole = on[faces_in_order(name, mesh.cells)].all(axis=2)
-    linear = np.asarray(whole).any(axis=1)
+    linear = np.zeros(len(degree), bool)
     nodes, masters = hanging_nodes(mesh.points, [(name, mesh.cells)])
     if len(nodes):
         edges = mesh.cells[:, np.array([edge[:2] for edge in shape(name).edges])]
         halved = unions.is_in(edges.reshape(-1, 2), masters[masters[:, 2] < 0, :2]).reshape(len(edges), -1)
         linear |= halved.any(axis=1) | np.isin(mesh.cells, nodes).any(axis=1)
-    return np.where(linear, 1, degree)
+    return paired_degrees(name, mesh.cells, mesh.pairs, np.where(linear, 1, degree), ~linear)
 
 
 def _of_degrees(ctx: Context, name: str, cells: IntArray, degree: IntArray) -> Maillage:

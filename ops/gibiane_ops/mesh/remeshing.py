@@ -46,9 +46,9 @@ REMA = operator(
     "nodes. Contact pairs are divided alike (QUA4, CUB8: all the elements of a contact). The table given back holds "
     "under ARBRE what coarsening needs; the mesh gets about as many elements as the sizes ask for on the whole, so "
     "that sizes that vary much within an element change little at a time. `M2 T2 = REMAILLER M1 MARQ 'GROU' T1`, also "
-    "with a size and 'LOCA': elements where the field MARQ exceeds 0.5 become quadratic, others linear, as those of a "
-    "contact stay; RELA MODL ties the "
-    "mid-nodes beside linear elements. `M2 T2 = REMAILLER M1 'DEPL' V 'GROU' T1`: the same elements on new nodes, "
+    "with a size and 'LOCA': elements where the field MARQ exceeds 0.5 become quadratic, others linear; at a contact "
+    "(PAIRES) the partner rises too, and their mid-nodes pair; RELA MODL ties the mid-nodes beside linear elements. "
+    "`M2 T2 = REMAILLER M1 'DEPL' V 'GROU' T1`: the same elements on new nodes, "
     "moved by the field V. Meshes of second degree get mid-nodes again; on the boundary they are those of "
     "new straight edges, unless it is kept.",
     example="""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels.adapt.hanging import middles_on_linear
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.topology import middles_on_linear
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.rigidite import Rigidite
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels import geometry, topology
-from gibiane_ops.kernels.adapt.sizes import FLOOR, limit_growth, nodal_sizes
+from gibiane_ops.kernels import topology
+from gibiane_ops.kernels.adapt.sizes import FLOOR, SizeMap, size_map
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.topology import Block
 
@@ -22,17 +22,9 @@ NODES = {
 }  # fmt: skip
 """Nodes per element of a large mesh: what an element costs."""
 
-ROUNDS = 4
-"""Times that degrees and sizes are planned, with the sizes that the last plan gave."""
-
-LEFT_BY_DEGREE = 1 / 60
-"""Share of the squared error that the second degree leaves, for elements as large as the slope of the stress varies."""
-
-ROUND_OFF = 1e-10
-"""Change of a stress over an element, in units of the largest, below which it is none."""
-
-LEFT_AT_PEAK = 0.25
-"""The same in elements that touch a singularity of order one half: p^(-4 lambda)."""
+DOUBT = 4.0
+"""Factor on the squared errors of linear elements in the choice: beside them quadratic ones lose mid-nodes, and what is
+known of them is the least error that they can have."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,100 +70,9 @@ class Plan:
     nodes: float
 
 
-def smoothness(points: FloatArray, blocks: Sequence[Block], stress: Sequence[FloatArray]) -> FloatArray:
-    """Measure the length over which the slope of a stress varies around each element.
-
-    Parameters
-    ----------
-    points : (n, dim) float64, length
-    blocks : sequence of (str, (m, n_nodes) int64)
-    stress : sequence of (m, n_nodes, c) float64
-        Smoothed stress at the nodes of each element.
-
-    Returns
-    -------
-    (n_cells,) float64, length
-        Root of the sum of |grad s|^2 over that of |grad grad s|^2, over the elements that share a node with it;
-        infinite where the stress is linear.
-
-    Notes
-    -----
-    The slope at a corner is the mean of those of its elements, weighted by their measures; second derivatives are the
-    gradients of this field, linear in each element.
-    """
-    n = len(points)
-    gradients, weights, slopes = [], [], []
-    total = np.zeros(n)
-    for (name, cells), values in zip(blocks, stress, strict=True):
-        of = shape(name)
-        each, density = geometry.gradients(of, points[cells], of.gauss[0])
-        weight = density * of.gauss[1]
-        gradients.append(each)
-        weights.append(weight)
-        slopes.append(np.einsum("mqnd,mnc->mqcd", each, values))
-        np.add.at(total, cells[:, : of.n_corners], weight.sum(axis=1)[:, None])
-    mean = np.zeros((n, *slopes[0].shape[2:]))
-    for (name, cells), weight, slope in zip(blocks, weights, slopes, strict=True):
-        integral = np.einsum("mq,mqcd->mcd", weight, slope)
-        np.add.at(mean, cells[:, : shape(name).n_corners], integral[:, None])
-    mean[total > 0] /= total[total > 0][:, None, None]
-    highest = max(float(np.abs(values).max(initial=0.0)) for values in stress)
-    first, second = [], []
-    for (name, cells), weight in zip(topology.corner_blocks(blocks), weights, strict=True):
-        of = shape(name)
-        at = mean[cells]
-        each, density = geometry.gradients(of, points[cells], of.gauss[0])
-        curved = np.einsum("mqnd,mnce->mqcde", each, at)
-        inside = np.einsum("qn,mnce->mqce", of.N(of.gauss[0]), at)
-        weight = density * of.gauss[1]
-        first.append((weight * (inside**2).sum(axis=(2, 3))).sum(axis=1))
-        bend = (weight * (curved**2).sum(axis=(2, 3, 4))).sum(axis=1)
-        measure = weight.sum(axis=1)
-        # round-off of a linear stress is no curvature
-        noise = ROUND_OFF**2 * highest**2 * measure ** (1 - 4 / of.dim)
-        second.append(np.where(bend > noise, bend, 0.0))
-    sums = [_over_stars(n, blocks, np.concatenate(each)) for each in (first, second)]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(sums[1] > 0, np.sqrt(sums[0] / sums[1]), np.inf), np.float64)
-
-
-def _over_stars(n_points: int, blocks: Sequence[Block], values: FloatArray) -> FloatArray:
-    """Add values over the elements of each node, then take the mean over the nodes of each element."""
-    total = np.zeros(n_points)
-    start = 0
-    for _, cells in blocks:
-        own = values[start : start + len(cells)]
-        np.add.at(total, cells, own[:, None])
-        start += len(cells)
-    return np.concatenate([total[cells].mean(axis=1) for _, cells in blocks])
-
-
-def left_by_degree(size: FloatArray, length: FloatArray, peak: BoolArray) -> FloatArray:
-    """Predict the share of the squared error of linear elements that the second degree leaves.
-
-    Parameters
-    ----------
-    size, length : (m,) float64, length
-        Size of the elements, and `smoothness` around them.
-    peak : (m,) bool
-        Elements that touch a singularity.
-
-    Returns
-    -------
-    (m,) float64
-        At most 1: quadratic elements hold the linear ones.
-
-    Notes
-    -----
-    ``h^2 |grad grad s|^2 / (60 |grad s|^2)``: on a segment the least distance of ``x^2 / 2`` to the linear functions
-    is ``h^5 / 720``, that of ``x`` to the constants ``h^3 / 12``. Measured on smooth fields, 1/60 holds within a factor
-    2 for triangles, squares, bricks, and on average for tetrahedra. At a singularity ``p^(-4 lambda)`` (Babuska and
-    Suri 1987).
-    """
-    return np.where(peak, LEFT_AT_PEAK, np.minimum(LEFT_BY_DEGREE * (size / length) ** 2, 1.0))
-
-
-def plan(of: Choices, target: float, dim: int, largest: float | FloatArray = np.inf) -> Plan:
+def plan(
+    of: Choices, target: float, dim: int, largest: float | FloatArray = np.inf, around: sp.csr_array | None = None
+) -> Plan:
     """Choose the degree and the size of each element that give the prescribed error with the fewest nodes.
 
     Parameters
@@ -182,6 +83,8 @@ def plan(of: Choices, target: float, dim: int, largest: float | FloatArray = np.
     dim : int
     largest : float or (m,) float64
         Most that sizes may grow, as a ratio.
+    around : (m, m) csr_array, optional
+        Mean over neighbours of what the second degree saves, before elements choose.
 
     Returns
     -------
@@ -211,8 +114,10 @@ def plan(of: Choices, target: float, dim: int, largest: float | FloatArray = np.
         r = np.exp((np.log(dim * of.nodes / (2 * of.order * e2)) - log_a) / (2 * of.order + dim))
         r = np.minimum(r, largest)
         error, nodes = r ** (2 * of.order) * e2, of.nodes * r**-dim
-        price = np.where(of.allowed, nodes + np.exp(log_a) * error, np.inf)
-        quadratic = price[1] < price[0]
+        price = nodes + np.exp(log_a) * error
+        both = of.allowed.all(axis=0)
+        saved = np.where(both, price[0] - price[1], 0.0)
+        quadratic = np.where(both, (saved if around is None else around @ saved) > 0, of.allowed[1])
         r, error, nodes = (np.where(quadratic, each[1], each[0]) for each in (r, error, nodes))
         return r, error, nodes, quadratic
 
@@ -228,59 +133,64 @@ def plan(of: Choices, target: float, dim: int, largest: float | FloatArray = np.
 def degree_map(
     points: FloatArray,
     blocks: Sequence[Block],
-    size: FloatArray,
     of: Choices,
     target: float,
     *,
-    growth: float = 2.0,
     pairs: IntArray | None = None,
-) -> tuple[FloatArray, Plan]:
-    """Bring the plan to the nodes, and plan again with the sizes that the neighbours let elements have.
+    max_count: float | None = None,
+) -> tuple[SizeMap, BoolArray]:
+    """Choose the degree of each element, then the sizes of the coarsest mesh of these degrees.
 
     Parameters
     ----------
     points : (n, dim) float64, length
     blocks : sequence of (str, (m, n_nodes) int64)
-    size : (n_cells,) float64, length
-        Sizes of now.
     of, target
         See `plan`.
-    growth : float
-        See `limit_growth`.
-    pairs : (k, 2) int64, optional
-        See `nodal_sizes`.
+    pairs
+        See `size_map`.
+    max_count : float, optional
+        Elements at most.
 
     Returns
     -------
-    nodal : (n,) float64, length
-        Sizes wanted.
-    plan : Plan
-        With the sizes that elements get from the nodes.
+    sizes : SizeMap
+        Its `reachable` is what the number of elements allows.
+    quadratic : (m,) bool
 
     Notes
     -----
-    Beside small elements large ones are small too, and then quadratic ones cost more than they gain: the sizes that
-    elements get bound the next plan, `ROUNDS` times. One factor on all sizes restores the error that means between
-    neighbours change.
+    The choice supposes that elements do not grow (those of the first mesh cannot), takes the errors of linear elements
+    for `DOUBT` times what they are, and averages over the stars of the nodes what the second degree saves: a lone
+    element gains nothing. Sizes follow from the errors and orders of the degrees chosen, as without a choice.
     """
     corner = topology.corner_blocks(blocks)
-    dim = points.shape[1]
-    edges = topology.edges(corner)
-    links = edges if pairs is None else np.concatenate([edges, pairs])
-    largest: FloatArray = np.full(len(size), np.inf)
-    for _ in range(ROUNDS):
-        found = plan(of, target, dim, largest)
-        nodal = nodal_sizes(len(points), corner, found.ratios * size, pairs=pairs)
-        nodal = limit_growth(points, links, nodal, growth)
-        got = np.concatenate([np.exp(np.log(nodal[cells]).mean(axis=1)) for _, cells in corner]) / size
-        row = found.quadratic.astype(np.int64)[None]
-        order, error2, nodes = (np.take_along_axis(each, row, 0)[0] for each in (of.order, of.error2, of.nodes))
-        predicted = float(np.sqrt((got ** (2 * order) * error2).sum()))
-        final = Plan(found.quadratic, got, predicted, float((nodes * got**-dim).sum()))
-        largest = np.where(got < found.ratios, got, np.inf)
-    middles = topology.middles(blocks)
-    nodal[middles[:, 2]] = nodal[middles[:, :2]].mean(axis=1)
-    return nodal, final
+    doubted = replace(of, error2=of.error2 * np.array([[DOUBT], [1.0]]))
+    found = plan(doubted, target, points.shape[1], largest=1.0, around=_star_mean(len(points), corner))
+    row = found.quadratic.astype(np.int64)[None]
+    order, error2 = (np.take_along_axis(each, row, 0)[0] for each in (of.order, of.error2))
+    sizes = size_map(points, blocks, np.sqrt(error2), target, order=order, pairs=pairs)
+    if max_count is not None and sizes.count > max_count:
+        wider = (sizes.count / max_count) ** (1 / points.shape[1])
+        expected = float(np.sqrt((error2 * (wider * sizes.ratios) ** (2 * order)).sum()))
+        sizes = replace(sizes, nodal=wider * sizes.nodal, count=float(max_count), reachable=expected)
+    return sizes, found.quadratic
+
+
+def _star_mean(n_points: int, blocks: Sequence[Block]) -> sp.csr_array:
+    """Give the mean over the nodes of each element of the means over the elements of each node, (m, m)."""
+    row, column, start = [], [], 0
+    for _, cells in blocks:
+        row.append(np.repeat(start + np.arange(len(cells)), cells.shape[1]))
+        column.append(cells.ravel())
+        start += len(cells)
+    entries = (np.ones(sum(map(len, row))), (np.concatenate(row), np.concatenate(column)))
+    member = sp.csr_array(entries, shape=(start, n_points))
+
+    def averaged(matrix: sp.csr_array) -> sp.csr_array:
+        return sp.csr_array(sp.diags_array(1 / np.maximum(matrix.sum(axis=1), 1.0)) @ matrix)
+
+    return sp.csr_array(averaged(member) @ averaged(sp.csr_array(member.T)))
 
 
 def raise_only(
@@ -293,7 +203,7 @@ def raise_only(
     error2 : (m,) float64
     target : float
     left : (m,) float64
-        See `left_by_degree`.
+        See `shares.left_by_degree`.
     added : (m,) float64
         Nodes that raising an element adds.
     may_rise : (m,) bool
@@ -314,22 +224,3 @@ def raise_only(
     raised = np.zeros(len(error2), bool)
     raised[ranked[:enough]] = True
     return raised, float(np.sqrt(max(float(error2.sum() - gain[raised].sum()), 0.0)))
-
-
-def with_facet_on(blocks: Sequence[Block], on: BoolArray) -> BoolArray:
-    """Find the elements one of whose facets has all its corners among given nodes.
-
-    Parameters
-    ----------
-    blocks : sequence of (str, (m, n_nodes) int64)
-    on : (n,) bool
-
-    Returns
-    -------
-    (n_cells,) bool
-    """
-    found: list[BoolArray] = []
-    for name, cells in topology.corner_blocks(blocks):
-        inside = [on[cells[:, list(n)]].all(axis=1) for _, n in shape(name).faces]
-        found.append(np.asarray(np.stack(inside, 1).any(axis=1), np.bool_))
-    return np.concatenate(found)

@@ -15,27 +15,6 @@ TOLERANCE = 1e-9
 """Distance of a hanging node to the middle of its edge or face, as a share of the edge."""
 
 
-def middles_on_linear(blocks: Sequence[Block]) -> IntArray:
-    """Find the mid-nodes of quadratic elements whose edge is also that of a linear element.
-
-    Parameters
-    ----------
-    blocks : sequence of (str, (m, n_nodes) int64)
-
-    Returns
-    -------
-    (k, 3) int64
-        The two ends, then the mid-node, by increasing mid-node.
-    """
-    quadratic = topology.middles(blocks)
-    ends = topology.edges([(name, cells) for name, cells in blocks if shape(name).degree == 1])
-    if not len(quadratic) or not len(ends):
-        return quadratic[:0]
-    n = np.int64(max(quadratic.max(), ends.max()) + 1)
-    pair = np.sort(quadratic[:, :2], axis=1)
-    return np.asarray(quadratic[_among(pair[:, 0] * n + pair[:, 1], np.sort(ends[:, 0] * n + ends[:, 1]))], np.int64)
-
-
 def hanging_nodes(points: FloatArray, blocks: Sequence[Block]) -> tuple[IntArray, IntArray]:
     """Find the nodes that stand in the middle of an edge or of a face of a larger or linear element.
 
@@ -60,7 +39,7 @@ def hanging_nodes(points: FloatArray, blocks: Sequence[Block]) -> tuple[IntArray
     """
     linear = [(name, cells) for name, cells in blocks if shape(name).degree == 1]
     ends = topology.edges(linear)
-    beside = middles_on_linear(blocks)
+    beside = topology.middles_on_linear(blocks)
     found_nodes, found_masters = [beside[:, 2]], [_padded(beside[:, :2])]
     edge_of, middle = halved_edges(points, ends)
     found_nodes.append(middle)

@@ -12,7 +12,7 @@ from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
 from gibiane_ops.kernels.geometry import circumferences, measure_densities, normal_densities
-from gibiane_ops.kernels.topology import Block
+from gibiane_ops.kernels.topology import Block, middles_on_linear
 
 SHIFT = 0.2
 """Share of the functions of its two middle nodes that a corner of a quadratic facet takes over."""
@@ -182,6 +182,8 @@ def middles_of(facets: Sequence[Block]) -> IntArray:
 def integrals(points: FloatArray, surface: Surface, axisymmetric: bool = False) -> FloatArray:
     """Integrate the functions N~ of a surface: the area of each node.
 
+    A middle on the side of a linear facet follows the two corners, which share its area.
+
     Parameters
     ----------
     points : (n_points, d) float64, length
@@ -192,9 +194,10 @@ def integrals(points: FloatArray, surface: Surface, axisymmetric: bool = False) 
     Returns
     -------
     (k,) float64, area
-        Positive, adding up to the area of the surface.
+        Positive, zero at middles that follow corners, adding up to the area of the surface.
     """
     total = np.zeros(len(surface.nodes))
+    held = middles_on_linear(surface.facets)
     for name, local in surface.facets:
         of, X = shape(name), points[surface.nodes[local]]
         xi, weights = of.mass_gauss
@@ -202,4 +205,6 @@ def integrals(points: FloatArray, surface: Surface, axisymmetric: bool = False) 
         if axisymmetric:
             measure = measure * circumferences(of, X, xi)
         np.add.at(total, local, measure @ of.N(xi) @ transformation(of))
+    np.add.at(total, held[:, :2], 0.5 * total[held[:, 2], None])
+    total[held[:, 2]] = 0.0
     return total

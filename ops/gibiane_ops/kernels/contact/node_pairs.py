@@ -12,7 +12,7 @@ from gibiane_ops.kernels.contact.facets import Surface, integrals, middles_of, s
 from gibiane_ops.kernels.contact.outward import nodal_normals
 from gibiane_ops.kernels.contact.pairs import FACING, ROUND_OFF, ContactPairs
 from gibiane_ops.kernels.errors import EmptyContact
-from gibiane_ops.kernels.topology import Block
+from gibiane_ops.kernels.topology import Block, middles_on_linear
 
 
 def node_pairs(
@@ -52,7 +52,8 @@ def node_pairs(
     Notes
     -----
     The normal of a node is the mean of the normals of its slave facets, weighted by their areas. A master node goes to
-    the nearest slave node only. A distance below ``ROUND_OFF`` times the size of the surfaces counts as zero.
+    the nearest slave node only. A distance below ``ROUND_OFF`` times the size of the surfaces counts as zero. A middle
+    of a quadratic facet on the side of a linear one follows its corners: it makes no pair, and is not left alone.
 
     Cost
     ----
@@ -62,11 +63,15 @@ def node_pairs(
 
     slave_nodes, slave_normals = nodal_normals(points, slave)
     master_nodes, master_normals = nodal_normals(points, master)
+    following, led = (middles_on_linear(each)[:, 2] for each in (slave, master))
+    own = ~np.isin(master_nodes, led)
+    master_nodes, master_normals = master_nodes[own], master_normals[own]
     if not len(slave_nodes) or not len(master_nodes):
         raise EmptyContact("a surface without facets")
     size = float(np.ptp(points[np.r_[slave_nodes, master_nodes]], axis=0).max())
     reach = 1e-6 * size if tolerance is None else tolerance
     distance, nearest = cKDTree(points[master_nodes]).query(points[slave_nodes])
+    distance[np.isin(slave_nodes, following)] = np.inf
     # two slave nodes may claim one master node: the nearer has it
     order = np.argsort(distance, kind="stable")
     claims = order[np.unique(nearest[order], return_index=True)[1]]
@@ -91,7 +96,7 @@ def node_pairs(
         gap,
         points[pairs[:, 0]],
         np.zeros(len(pairs), np.int64),
-        np.delete(slave_nodes, kept),
+        np.setdiff1d(np.delete(slave_nodes, kept), following),
         np.delete(master_nodes, partner),
         np.flatnonzero(cosine > FACING),
         np.flatnonzero(gap < 0),

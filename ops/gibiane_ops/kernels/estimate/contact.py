@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
-from gibiane_ops.kernels import assembly, geometry, integrals
+from gibiane_ops.kernels import assembly, geometry, integrals, topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.cone import norms, radial_projection
 from gibiane_ops.kernels.elements.table import shape
@@ -59,7 +60,7 @@ def densities(
     facets : list of (str, (m, n) int64)
         Facets of the contact surface of body 1.
     nodes : (k,) int64
-        Nodes of these facets that carry contact.
+        Nodes of these facets that carry contact. Middles on the side of a linear facet follow its corners.
     force : (k, d) float64, force
         Global components.
     lumped : bool
@@ -76,16 +77,45 @@ def densities(
     ----
     One factorisation of size k.
     """
+    every, follow = with_following(facets, nodes)
     masses = [
-        (_local(nodes, cells), integrals.element_mass(shape(name), points[cells], axisymmetric=axisymmetric))
+        (_local(every, cells), integrals.element_mass(shape(name), points[cells], axisymmetric=axisymmetric))
         for name, cells in facets
     ]
-    # A node without contact keeps a zero density: its row and column drop out.
-    M = assembly.assemble(len(nodes) + 1, 1, masses)[: len(nodes), : len(nodes)]
     if lumped:
         ones = [(cells, mass.sum(axis=2)[:, :, None]) for cells, mass in masses]
-        return np.asarray(force / assembly.assemble_vector(len(nodes) + 1, 1, ones)[:-1, None], np.float64)
-    return factorize(M).solve(force)
+        row_sums = follow.T @ assembly.assemble_vector(len(every) + 1, 1, ones)[:-1]
+        return np.asarray(force / row_sums[:, None], np.float64)
+    # A node without contact keeps a zero density: its row and column drop out.
+    M = assembly.assemble(len(every) + 1, 1, masses)[: len(every), : len(every)]
+    return factorize(sp.csr_array(follow.T @ M @ follow)).solve(force)
+
+
+def with_following(facets: Sequence[Block], nodes: IntArray) -> tuple[IntArray, sp.csr_array]:
+    """Add the middles on the sides of linear facets: they follow their corners, and make no contact pair.
+
+    Parameters
+    ----------
+    facets : list of (str, (m, n) int64)
+    nodes : (k,) int64
+        Nodes of these facets that carry contact.
+
+    Returns
+    -------
+    every : (k + h,) int64
+        These nodes, then the middles.
+    follow : (k + h, k) csr_array
+        Values at all of them from those at the nodes.
+    """
+    held = topology.middles_on_linear(facets)
+    held = held[np.isin(held[:, :2], nodes).all(axis=1) & ~np.isin(held[:, 2], nodes)]
+    k, h = len(nodes), len(held)
+    order = np.argsort(nodes)
+    ends = order[np.searchsorted(nodes[order], held[:, :2])] if h else np.zeros((0, 2), np.int64)
+    row = np.concatenate([np.arange(k), np.repeat(k + np.arange(h), 2)])
+    column = np.concatenate([np.arange(k), ends.ravel()])
+    share = np.concatenate([np.ones(k), np.full(2 * h, 0.5)])
+    return np.concatenate([nodes, held[:, 2]]), sp.csr_array((share, (row, column)), shape=(k + h, k))
 
 
 def _local(nodes: IntArray, cells: IntArray) -> IntArray:
@@ -172,13 +202,17 @@ def contact_error(
         parts = _shares(points, facets, nodes, _work(fields, frames.shape[1]))
     else:
         parts = []
+        every, follow = with_following(facets, nodes)
+        stuck = follow @ np.isinf(fields[:-1, -1]).astype(np.float64) > 0
+        fields = np.vstack([follow @ np.where(np.isinf(fields), 0.0, fields)[:-1], fields[-1:]])
+        fields[:-1][stuck, -1] = np.inf
         for name, cells in facets:
             face = shape(name)
             xi, weights = face.mass_gauss
             measure = geometry.measure_densities(face, points[cells], xi) * weights
             if axisymmetric:
                 measure = measure * geometry.circumferences(face, points[cells], xi)
-            at = _interpolate(face.N(xi), fields[_local(nodes, cells)])
+            at = _interpolate(face.N(xi), fields[_local(every, cells)])
             parts.append(np.asarray((measure * _work(at, frames.shape[1])).sum(axis=1), np.float64))
     return ContactError(parts, R, corrected)
 
