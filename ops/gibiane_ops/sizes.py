@@ -11,14 +11,15 @@ from gibiane.registry import Context, operator
 from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.adapt.diameters import smallest_lengths
-from gibiane_ops.kernels.adapt.orders import fitted_orders, singular_orders
+from gibiane_ops.kernels.adapt.orders import fitted_orders, singular_nodes, singular_orders
 from gibiane_ops.kernels.adapt.sizes import size_map
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.topology import places_in, used_nodes
+from gibiane_ops.kernels.topology import corner_blocks, places_in, used_nodes
 from gibiane_ops.values.algebra import SCAL
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.material import MATERIAL, solid_zones
+from gibiane_ops.values.maillage import Maillage
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.results import wanted_results
@@ -38,9 +39,11 @@ TAIL = operator(
     "peaks, 'AJUS' to what the error around shows; the fewest elements are sought, with 'EGAL' (which implies 'SING') "
     "equal errors of all elements; 'MINI' and 'MAXI' bound the sizes, 'GRAD' their growth (1.5), 'NBMA' the number of "
     "elements; 'MINN' takes at a node the smallest size around it rather than their geometric mean. `CHD NB = TAILLE "
-    "...` also gives the number of elements that the sizes ask for. `CHM = TAILLE 'METRIQUE' U MODL 'NBMA' n`: the "
-    "metric (G11 G21 G22, in space G31 G32 G33) of n simplices on which the field U is interpolated best, long where "
-    "it varies little; 'ALLO' bounds how long. `CHD MARQ EP (NB) = TAILLE 'DEGRE' CARTE MODL SIGL (SIG) 'PREC' e0`: "
+    "...` also gives the number of elements that the sizes ask for, `CHD NB SN = TAILLE ...` the nodes where the error "
+    "peaks too (POI1; 'BETA' b: singular from b times the mean density of the error). `CHM = TAILLE 'METRIQUE' U "
+    "MODL 'NBMA' n`: the metric (G11 G21 G22, in space G31 G32 G33) of n simplices on which the field U is "
+    "interpolated best, long where it varies little; 'ALLO' bounds how long. `CHD MARQ EP (NB) = TAILLE 'DEGRE' CARTE "
+    "MODL SIGL (SIG) 'PREC' e0`: "
     "sizes, elements to raise to the second degree (1) or not (0), and the error expected; SIGL is the smoothed "
     "stress, SIG that of the solution, from which what quadratic elements gain is measured (else predicted); "
     "'NBMA' bounds the number of elements, EP is then what they reach; 'SEUL' divides nothing. Nodes at one place in "
@@ -83,12 +86,18 @@ def _smallest(ctx: Context, diameter: bool, model: Modele, cara: MChaml | None) 
     Key("SING", "order 0.5 where the error peaks"),
     Key("AJUSTE", "order fitted where the error peaks", name="fit"),
     Key("EGAL", "equal errors of all elements, not the fewest elements", name="equal"),
+    Key(
+        "BETA",
+        "error density around a node, over that of the whole, from which it is singular (3 in space with linear "
+        "elements, else 2)",
+        Arg("b", FLOTTANT),
+    ),
     Key("MINI", "smallest size", Arg("h1", FLOTTANT)),
     Key("MAXI", "largest size", Arg("h2", FLOTTANT)),
     Key("GRAD", "growth of sizes from a node to the next", Arg("g", FLOTTANT)),
     Key("NBMA", "largest number of elements", Arg("n", FLOTTANT)),
     Key("MINN", "smallest size around a node, not the geometric mean"),
-    gives=[CHPOINT, "(FLOTTANT)"],
+    gives=[CHPOINT, "(FLOTTANT)", "(MAILLAGE)"],
 )
 def _wanted(
     ctx: Context,
@@ -100,6 +109,7 @@ def _wanted(
     sing: bool,
     fit: bool,
     equal: bool,
+    beta: float | None,
     mini: float | None,
     maxi: float | None,
     grad: float | None,
@@ -115,11 +125,14 @@ def _wanted(
     blocks = [(z.shape, places_in(nodes, z.cells)) for z in zones]
     degrees = np.concatenate([np.full(len(z.cells), float(shape(z.shape).degree)) for z in zones])
     order: float | FloatArray = ordre if ordre is not None else degrees if np.ptp(degrees) else float(degrees[0])
+    if beta is None:
+        # Peaks of linear solid elements are sharper than those of plane or quadratic ones.
+        beta = 3.0 if zones[0].dim == 3 and degrees.max() == 1 else 2.0
+    elif not beta > 0:
+        ctx.fail(41, "BETA is a ratio of error densities: {value} cannot be one", at="beta", value=beta)
     with worded(ctx, at="prec"):
+        measures = np.concatenate([geometry.measures(shape(n), points[c]) for n, c in blocks])
         if sing or fit or equal:
-            measures = np.concatenate([geometry.measures(shape(n), points[c]) for n, c in blocks])
-            # Peaks of linear solid elements are sharper than those of plane or quadratic ones.
-            beta = 3.0 if zones[0].dim == 3 and degrees.max() == 1 else 2.0
             if fit:
                 order = fitted_orders(points, blocks, error**2, measures, order, beta=beta)[0]
             else:
@@ -159,7 +172,11 @@ def _wanted(
             reachable=f"{found.reachable:.3g}",
         )
     field = ChPoint(store, {SCAL: (nodes, found.nodal)}, DIFFUS)
-    return (field, float(found.count)) if wanted_results(ctx) > 1 else field
+    if wanted_results(ctx) < 3:
+        return (field, float(found.count)) if wanted_results(ctx) > 1 else field
+    corners = corner_blocks(blocks)
+    peak = np.flatnonzero(singular_nodes(len(points), corners, error**2, measures, beta))
+    return field, float(found.count), Maillage.of(store, "POI1", nodes[peak][:, None])
 
 
 @TAIL.form(
