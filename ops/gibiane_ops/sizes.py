@@ -18,8 +18,8 @@ from gibiane_ops.kernels.topology import corner_blocks, places_in, used_nodes
 from gibiane_ops.values.algebra import SCAL
 from gibiane_ops.values.champs import DIFFUS, ChamZone, ChPoint, MChaml
 from gibiane_ops.values.failures import worded
-from gibiane_ops.values.material import MATERIAL, solid_zones
 from gibiane_ops.values.maillage import Maillage
+from gibiane_ops.values.material import MATERIAL, solid_zones
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.results import wanted_results

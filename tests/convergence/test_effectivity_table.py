@@ -1,4 +1,4 @@
-"""The tables of examples/effectivite: every estimate and element, problems with known stresses in a plane and in space."""
+"""The tables of examples/effectivite: every estimate and element, known stresses in a plane and in space."""
 
 import io
 from functools import lru_cache
