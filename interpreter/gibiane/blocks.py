@@ -98,6 +98,17 @@ class _Matcher:
                 return
 
 
+def never_closed(instr: Instr) -> Diagnostic:
+    """Word the error of a DEBP without its FINP."""
+    return make(
+        1134,
+        "this procedure is never closed",
+        operator="DEBPROC",
+        span=instr.span(),
+        hint="write FINP and its results after the last instruction",
+    )
+
+
 def check_structure(program: list[Instr], start: int, end: int) -> list[Diagnostic]:
     """Report the wrong block structure of instructions [start, end): errors 1020 to 1024, 154."""
     found: list[Diagnostic] = []

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from gibiane import cast3m, slips
-from gibiane.blocks import annotate, block_name, check_structure
-from gibiane.diagnostics import Diagnostic, make
+from gibiane.blocks import annotate, block_name, check_structure, never_closed
+from gibiane.diagnostics import Diagnostic
 from gibiane.nodes import Access, Group, Instr, Literal, Name, Node
 from gibiane.source import SourceText
 from gibiane.syntax import parse, refuse_long
@@ -57,16 +57,7 @@ def _structure(program: list[Instr]) -> list[Diagnostic]:
         instr = program[index]
         if instr.head in ("DEBP", "DEBM"):
             if instr.jump is None:
-                found.append(
-                    make(
-                        1134,
-                        "this procedure is never closed",
-                        operator="DEBPROC",
-                        span=instr.span(),
-                        hint="write FINP and its results after the last instruction",
-                    )
-                )
-                return found
+                return [*found, never_closed(instr)]
             found.extend(_loose(check_structure(program, outer, index)))
             found.extend(check_structure(program, index + 1, instr.jump))
             index = instr.jump

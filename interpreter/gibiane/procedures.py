@@ -6,7 +6,7 @@ from typing import Any
 
 from gibiane import compiled, slips
 from gibiane.binding import ABSENT, Operands
-from gibiane.blocks import annotate, check_structure
+from gibiane.blocks import annotate, check_structure, never_closed
 from gibiane.diagnostics import GibianeError, make
 from gibiane.frames import Frame
 from gibiane.nodes import Instr, Literal, Name, Node
@@ -64,15 +64,7 @@ def define(ev: Runner, program: list[Instr], pc: int) -> int:
     instr = program[pc]
     end = instr.jump
     if end is None:
-        raise GibianeError(
-            make(
-                1134,
-                "this procedure is never closed",
-                operator="DEBPROC",
-                span=instr.span(),
-                hint="write FINP and its results after the last instruction",
-            )
-        )
+        raise GibianeError(never_closed(instr))
     problems = check_structure(program, pc + 1, end)
     if problems:
         raise GibianeError(problems[0])
