@@ -55,6 +55,8 @@ def test_contact_law_violations_by_hand(variant):
     assert held.total == pytest.approx(0.4, rel=1e-12)
     gapped = on_one_face([-1.0, 0.0, 0.0], [0.1, 0.0, 0.0], gap=0.1, variant=variant)
     assert gapped.total == pytest.approx(0.0, abs=1e-15)
+    apart = on_one_face([-1.0, 0.0, 0.0], [0.0, 0.0, 0.0], gap=0.1, variant=variant)  # pressed across the gap: 4 x 0.1
+    assert apart.total == pytest.approx(0.4, rel=1e-12)
     pulled = on_one_face([1.0, 0.5, 0.0], [-0.1, 0.2, 0.0], variant=variant)  # tension is cut to nothing
     assert pulled.total == 0.0
     assert pulled.corrected == 4
@@ -79,6 +81,19 @@ def test_integral_of_a_triangle():
             force, relative, np.zeros(3), 0.3, variant,
         )  # fmt: skip
         assert found.total == pytest.approx(1 / 6, rel=1e-12)
+
+
+@pytest.mark.parametrize("variant", ["DENS", "DLUM"])
+def test_integral_once_round_the_axis(variant):
+    # A pressure of 5 on the ring 1 < r < 2, whose faces are 0.1 apart: 5 x 0.1 x pi (4 - 1).
+    points = np.array([[1.0, 0.0], [2.0, 0.0]])
+    frames = np.tile([[0.0, -1.0], [1.0, 0.0]], (2, 1, 1))
+    force = np.array([[-5 * 2 * np.pi * share, 0.0] for share in (4 / 6, 5 / 6)])  # int N r dr over the ring
+    found = contact_error(
+        points, [("SEG2", np.array([[1, 0]]))], np.arange(2), frames,
+        force, np.full((2, 2), [-0.1, 0.0]), np.zeros(2), 0.3, variant, axisymmetric=True,
+    )  # fmt: skip
+    assert found.total == pytest.approx(5 * 0.1 * np.pi * 3, rel=1e-12)
 
 
 def test_contact_error_is_never_negative():
