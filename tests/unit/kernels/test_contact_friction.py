@@ -143,3 +143,11 @@ def test_derivative_of_the_law(law, gamma):
     np.testing.assert_allclose((pairs.length(t, bound + h, gamma)[0] - s) / h, by_bound, atol=1e-5)
     if "exponent" in law:
         np.testing.assert_allclose(s + gamma * 0.2 * (s / bound) ** (1 / 0.3), t, rtol=1e-12)
+
+
+def test_a_bonded_pair_in_tension_loses_friction():
+    # mu N + cohesion with N below zero: 2 - 0.5 x 3, nothing once this is negative; pressed it gains as any pair.
+    law = friction(3, mu=0.5, cohesion=2.0, adhesion=10.0)
+    normal = np.array([3.0, 5.0, -4.0])
+    assert law.bound(normal, np.full(3, True)) == pytest.approx([0.5, 0.0, 4.0])
+    assert law.bound(normal) == pytest.approx([0.0, 0.0, 4.0])
