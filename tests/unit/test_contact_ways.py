@@ -160,3 +160,13 @@ def test_a_method_that_needs_the_exact_stiffness_takes_a_factor_though_multigrid
     kept = contact_of(session)
     assert session.run_text(SOLVE.format("")) == 0
     assert contact_of(session) is kept
+
+
+def test_graded_elements_take_a_factor_where_multigrid_iterates_long(session, corrected, monkeypatch):
+    monkeypatch.setattr("gibiane_ops.kernels.contact.tied.SLOW", 1)
+    monkeypatch.setattr("gibiane_ops.kernels.contact.tied.factor_is_faster", lambda *_: True)
+    exact, _ = solve(session)
+    found, _ = solve(session, "OPTI 'RESO' 'ITER' ;")
+    assert contact_of(session).tied.direct
+    for name, values in exact.items():
+        np.testing.assert_allclose(found[name], values, atol=3e-8 * np.abs(values).max())

@@ -23,6 +23,15 @@ MEMORY_SHARE = 0.6
 """Share of the free memory that a factorisation may take."""
 
 
+FACTOR_SECONDS = 3.7e-10
+"""Seconds of a factorisation in space over n^2, and of an iteration with multigrid over the entries of the matrix."""
+
+ITERATION_SECONDS = 1e-8
+
+SOLUTIONS = 8
+"""Solutions that a contact problem takes."""
+
+
 @dataclass(frozen=True)
 class Choice:
     """A method and why.
@@ -68,6 +77,25 @@ def direct_memory(n: int, dim: int) -> float:
 def iterative_memory(entries: int) -> float:
     """Predict the memory of conjugate gradients with multigrid, bytes, from the entries of the matrix."""
     return 40.0 * entries
+
+
+def factor_is_faster(n: int, entries: int, dim: int, iterations: int, memory: float | None = None) -> bool:
+    """Tell whether a factorisation fits and takes less time than `SOLUTIONS` solutions by so many iterations.
+
+    Parameters
+    ----------
+    n, entries : int
+        Unknowns and entries of the matrix.
+    dim : int
+    iterations : int
+        Of one solution with multigrid, as measured.
+    memory : float, optional
+        Free memory, bytes; that of the machine by default.
+    """
+    room = MEMORY_SHARE * (available_memory() if memory is None else memory)
+    if direct_memory(n, dim) > room or not any(is_installed(name) for name in DIRECT if name != "superlu"):
+        return False
+    return FACTOR_SECONDS * n**2 < SOLUTIONS * iterations * ITERATION_SECONDS * entries
 
 
 def choose(

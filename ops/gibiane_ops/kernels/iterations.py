@@ -58,8 +58,8 @@ class Iteration:
         self._most = most
         self.iterations = 0
 
-    def __call__(self, b: FloatArray, tolerance: float | None = None) -> FloatArray:
-        """Solve for one or several right-hand sides, to another tolerance if one is given.
+    def __call__(self, b: FloatArray, tolerance: float | None = None, most: int | None = None) -> FloatArray:
+        """Solve for one or several right-hand sides, to another tolerance or in other iterations if they are given.
 
         Raises
         ------
@@ -72,10 +72,11 @@ class Iteration:
         found = np.empty(columns.shape)
         for start in range(0, columns.shape[1], COLUMNS):
             part = slice(start, start + COLUMNS)
-            found[:, part] = self._run(columns[:, part], self._tolerance if tolerance is None else tolerance)
+            wanted = self._tolerance if tolerance is None else tolerance
+            found[:, part] = self._run(columns[:, part], wanted, self._most if most is None else most)
         return found.reshape(b.shape)
 
-    def _run(self, b: FloatArray, tolerance: float) -> FloatArray:
+    def _run(self, b: FloatArray, tolerance: float, most: int) -> FloatArray:
         single = b.shape[1] == 1
         if single:
             b = b[:, 0]
@@ -88,7 +89,7 @@ class Iteration:
         rz = (r * z).sum(axis=0)
         count = 0
         while active.any():
-            if count == self._most:
+            if count == most:
                 left = float((np.linalg.norm(r, axis=0)[active] / wanted[active]).max()) * tolerance
                 raise ArithmeticError(f"{count} iterations leave a relative residual of {left:.1e}")
             q = self._A @ p

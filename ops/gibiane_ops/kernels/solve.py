@@ -43,13 +43,20 @@ class Factor:
     """
 
     def __init__(
-        self, A: sp.csr_array, names: tuple[str, ...], near_null: FloatArray | None, block: int, tolerance: float
+        self,
+        A: sp.csr_array,
+        names: tuple[str, ...],
+        near_null: FloatArray | None,
+        block: int,
+        tolerance: float,
+        trial: int = 0,
     ) -> None:
         self._A = A
         self._packages = list(names)
         self._near_null = near_null
         self._block = block
         self._tolerance = tolerance
+        self._trial = trial
         self._limit = max(RESIDUAL_LIMIT, 10 * tolerance)
         self._notes: list[str] = []
         self._scale, self._definite = _diagonal_scale(A)
@@ -180,7 +187,8 @@ class Factor:
                 self._probe()
             except FAILURES as error:
                 what = "factorisation failed" if self.name in DIRECT else "no solution"
-                self._note(f"{self.name}: {what} ({error})")
+                if self.name != "amg" or not self._trial:
+                    self._note(f"{self.name}: {what} ({error})")
                 if self.name in DIRECT:
                     self._raise_if_singular(shifted=True)
                 continue
@@ -205,7 +213,7 @@ class Factor:
             n = self._A.shape[0]
             right = np.random.default_rng(0).standard_normal(n) / self._scale
             # a null vector holds about 1 / sqrt(n) of a random vector
-            self._solve(right, tolerance=0.1 / np.sqrt(n))
+            self._solve(right, tolerance=0.1 / np.sqrt(n), most=self._trial or None)
 
     def _raise_if_singular(self, shifted: bool) -> None:
         """Look for a null vector by inverse iteration; the matrix itself confirms it, whatever the package did."""
@@ -257,6 +265,7 @@ def factorize(
     block: int = 1,
     tolerance: float = 1e-10,
     reserve: bool = True,
+    trial: int = 0,
 ) -> Factor:
     """Factorise or precondition a symmetric sparse matrix.
 
@@ -277,6 +286,9 @@ def factorize(
         Relative residual where iterations stop.
     reserve : bool
         Whether direct packages may take over from iterations that fail.
+    trial : int
+        Iterations of ``amg`` on a first right-hand side after which a factorisation, in single precision if it can be,
+        takes over without a note; 0: as many as in any solution.
 
     Returns
     -------
@@ -316,14 +328,15 @@ def factorize(
             names = ("single", *installed) if is_installed("rslab") else installed
         case "amg" | "cg" | "minres":
             last = () if method == "minres" else ("minres",)
-            names = (method, *(installed if reserve else last))
+            direct = ("single", *installed) if trial and is_installed("rslab") else installed
+            names = (method, *(direct if reserve else last))
         case _ if method not in MODULES:
             raise BadValue("method", method, "one of auto, single, " + ", ".join((*MODULES, *ITERATIVE)))
         case _ if not is_installed(method):
             raise MissingPackage(MODULES[method], f"pip install {MODULES[method]}")
         case _:
             names = (method,)
-    return Factor(A, names, near_null, block, tolerance)
+    return Factor(A, names, near_null, block, tolerance, trial)
 
 
 def _diagonal_scale(A: sp.csr_array) -> tuple[FloatArray, bool]:

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.choice import factor_is_faster
 from gibiane_ops.kernels.rigid import rigid_modes
 from gibiane_ops.kernels.solve import ITERATIVE, Factor, factorize
 
@@ -16,6 +17,9 @@ PASS = 1e-4
 
 PRECISION = 1e-10
 """Relative residual of a complete solution by iterations."""
+
+SLOW = 40
+"""Iterations of the trial solution from which multigrid does badly: uniform meshes take 8 to 15, flat elements hundreds."""
 
 PASSES = 12
 """Passes after which iterations that do not reach ``PRECISION`` are given up."""
@@ -114,7 +118,8 @@ def tied_solver(
     Notes
     -----
     Multigrid wants whole nodes: unknowns that a node has not are added with an empty row and column, and its rigid
-    modes vanish there.
+    modes vanish there. Where its trial solution takes many iterations, as with elements that are graded or flat, a
+    factor takes its place if it fits.
 
     Cost
     ----
@@ -141,5 +146,8 @@ def tied_solver(
     del rows, whole  # of a million unknowns, two Gbyte that multigrid wants
     modes = rigid_modes(points[nodes], points[nodes].mean(axis=0))
     modes[missing] = 0.0
-    factor = factorize(blocks, method=method, near_null=modes, block=d, tolerance=PASS, reserve=False)
+    trial = SLOW if method == "amg" and factor_is_faster(A.shape[0], A.nnz, d, SLOW) else 0
+    factor = factorize(
+        blocks, method=method, near_null=modes, block=d, tolerance=PASS, reserve=bool(trial), trial=trial
+    )
     return TiedSolver(A, factor, place)
