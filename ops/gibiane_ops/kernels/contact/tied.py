@@ -19,7 +19,7 @@ PRECISION = 1e-10
 """Relative residual of a complete solution by iterations."""
 
 SLOW = 40
-"""Iterations of the trial solution from which multigrid does badly: uniform meshes take 8 to 15, flat elements hundreds."""
+"""Iterations of the trial solution from which multigrid does badly: uniform meshes take 8 to 15, flat ones hundreds."""
 
 PASSES = 12
 """Passes after which iterations that do not reach ``PRECISION`` are given up."""
