@@ -91,6 +91,7 @@ class Evaluator:
         if mode in ("IGNO", "CONT") and diag.level < FATAL and not self.session.interactive:
             self.session.worst = max(self.session.worst, diag.level)
             if mode == "IGNO":
+                diag.trace.extend(self.frame.calls())
                 self.session.emit(diag)
             return
         if self.failed is None:

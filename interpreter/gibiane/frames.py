@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from gibiane.binding import ABSENT, Operands
-from gibiane.nodes import Instr
+from gibiane.nodes import Instr, Node
+from gibiane.source import SourceText, Span
 from gibiane.values import Procedure
 
 
@@ -46,6 +47,7 @@ class Frame:
 
     __slots__ = (
         "arguments",
+        "called",
         "depth",
         "evaluator",
         "loops",
@@ -67,6 +69,7 @@ class Frame:
         self.loops: list[Loop] = []
         self.results: list[Any] = []
         self.arguments: Operands | None = None
+        self.called: tuple[SourceText, Node] | None = None
         self.this: Any = None
         self.quitting = False
         self.depth: int = 0 if parent is None else parent.depth + 1
@@ -90,6 +93,17 @@ class Frame:
                 return instr.span().line if instr is not None else None
             frame = frame.parent
         return None
+
+    def calls(self) -> list[tuple[str, Span]]:
+        """Return the procedures that are running, the innermost first, each with the place of its call."""
+        found = []
+        frame: Frame | None = self
+        while frame is not None:
+            if frame.procedure is not None and frame.called is not None:
+                source, node = frame.called
+                found.append((frame.procedure.name, Span(source, node.start, node.end)))
+            frame = frame.parent
+        return found
 
     def visible(self) -> dict[str, Any]:
         """Return every visible name with its value."""

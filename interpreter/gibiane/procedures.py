@@ -185,6 +185,7 @@ def _enter(ev: Runner, procedure: Procedure, source: SourceText, node: Node) -> 
             )
         )
     frame = Frame(ev, ev.frame, procedure)
+    frame.called = (source, node)
     if procedure.is_method:
         if procedure.this is None:
             raise GibianeError(
