@@ -37,6 +37,14 @@ def test_the_short_report_of_the_thesis(tmp_path: Path) -> None:
         for page in range(pages):
             browser.value(f"gibiane.open({page})")
         browser.wait("Object.keys(gibiane.views).length >= 6")
+        titles = browser.value("gibiane.data.pages.map((p) => p.title)")
+        assert {"Cost, footing", "Cost, wall", "Published", "Wall, loads"} <= set(titles)
+        # every axis can be read, and every published number that is not found again says why
+        axes = "Object.values(gibiane.charts).flatMap((c) => [c.x.ticks(46), c.y.ticks(26)])"
+        assert browser.value(f"Math.min(...{axes}.map((a) => a.filter((t) => t[1]).length))") >= 3
+        rows = browser.value("gibiane.data.pages.find((p) => p.title === 'Published').blocks[1].rows")
+        assert len(rows) > 90
+        assert [row[0] for row in rows if row[4] and not row[5]] == []
         assert browser.value("gibiane.errors.length") == 0
         assert browser.complaints == []
     finally:
