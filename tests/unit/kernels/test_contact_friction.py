@@ -151,3 +151,17 @@ def test_a_bonded_pair_in_tension_loses_friction():
     normal = np.array([3.0, 5.0, -4.0])
     assert law.bound(normal, np.full(3, True)) == pytest.approx([0.5, 0.0, 4.0])
     assert law.bound(normal) == pytest.approx([0.0, 0.0, 4.0])
+
+
+@pytest.mark.parametrize(
+    ("properties", "expected"),
+    [
+        ({"mu": 0.5}, [-2.0, 1.0]),
+        ({"mu": 0.5, "cohesion": 1.0}, [-1.6, 1.8]),  # apex at 2: (-3, 3) falls on (-3.6, 1.8)
+        ({"mu": 0.5, "adhesion": 0.5}, [-1.9, 1.2]),  # apex at 0.5
+        ({"cohesion": 1.0}, [-1.0, 1.0]),
+        ({"cohesion": 4.0}, [-1.0, 3.0]),
+    ],
+)
+def test_the_nearest_force_that_a_law_admits(properties, expected):
+    assert friction(1, **properties).nearest_possible(np.array([[-1.0, 3.0]])) == pytest.approx(np.array([expected]))
