@@ -243,4 +243,10 @@ MESH = {
     "give opposite sides as many elements, or change one side by one": "donner autant d'éléments aux côtés opposés, ou en changer un d'une unité",
     "the sides have {counts} elements: opposite ones must have as many on a curved surface": "les côtés ont {counts} éléments : sur une surface courbe les côtés opposés doivent en avoir autant",
     "a mesh of points is wanted, this one holds {shapes}": "un maillage de points est attendu, celui-ci contient {shapes}",
+    "sizes down to {least} ask for about {count} elements, which would take {needed} of memory": "des tailles jusqu'à {least} demandent environ {count} éléments, qui prendraient {needed} de mémoire",
+    "larger sizes; TAILLE bounds the number of elements with 'NBMA'": "des tailles plus grandes ; TAILLE borne le nombre d'éléments par 'NBMA'",
+    "an error is not negative: {count} values of the map are, down to {least}": "une erreur n'est pas négative : {count} valeurs de la carte le sont, jusqu'à {least}",
+    "its corners lie in one plane: move a node, or take the element out (DIFF)": "ses coins sont dans un plan : déplacer un noeud, ou ôter l'élément (DIFF)",
+    "the boundary crosses or touches itself: do solids overlap?": "la frontière se croise ou se touche : des solides se recouvrent-ils ?",
+    "ELEM '{wanted}' takes them alone": "ELEM '{wanted}' les prend seuls",
 }

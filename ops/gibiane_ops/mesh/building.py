@@ -211,6 +211,10 @@ def reference(ctx: Context, g: Maillage, i: int | None, what: str) -> Any:
     return g.sides[str(i)]
 
 
+CROSSED = ("PLC Error", "overlapping facets", "Invalid boundary mesh")
+"""What the mesher says of a boundary that crosses itself."""
+
+
 @contextmanager
 def explained(ctx: Context, at: str | None = None, failed: int = 27) -> Iterator[None]:
     """Turn failures of kernels into diagnostics about operand `at`; `failed` is the number for a mesher's refusal."""
@@ -218,4 +222,11 @@ def explained(ctx: Context, at: str | None = None, failed: int = 27) -> Iterator
         try:
             yield
         except MeshingFailed as failure:
-            ctx.fail(failed, "no mesh could be made: {reason}", at=at, reason=failure.reason)
+            crossed = any(word in failure.reason for word in CROSSED)
+            ctx.fail(
+                failed,
+                "no mesh could be made: {reason}",
+                at=at,
+                reason=failure.reason,
+                hint="the boundary crosses or touches itself: do solids overlap?" if crossed else "",
+            )

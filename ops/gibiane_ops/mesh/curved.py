@@ -13,7 +13,8 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import charts
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of, surface_shape
 from gibiane_ops.mesh.degree import finished, wants_quadratic
-from gibiane_ops.mesh.filling import SIZE, Size, added, contour_of, fill_contour, numbered, sizes_at
+from gibiane_ops.mesh.filling import SIZE, added, contour_of, fill_contour, numbered
+from gibiane_ops.mesh.wanted import Size, sizes_at
 from gibiane_ops.values.maillage import Maillage, Point
 from gibiane_ops.values.middles import middles_of
 

@@ -11,105 +11,10 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import edges
 from gibiane_ops.mesh.building import DIMENSION, dimension, explained, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import LINEAR, checked_degree, finished, linear_mesh, wants_quadratic
-from gibiane_ops.values.champs import ChPoint
+from gibiane_ops.mesh.wanted import Size, sizes_at
 from gibiane_ops.values.maillage import Maillage
 
 SIZE = Arg("size", (FLOTTANT, CHPOINT), "size of the elements inside", optional=True)
-Size = float | ChPoint | None
-
-
-def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> float | FloatArray | None:
-    """Return wanted edge lengths at nodes: one number, or the values of a field of component SCAL (length) or G.
-
-    Raises
-    ------
-    GibianeError
-        41 for a size that is not positive, 181 for a field of other components or that misses nodes.
-    """
-    if size is None:
-        return None
-    if not isinstance(size, ChPoint):
-        if not size > 0:
-            ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=size)
-        return float(size)
-    name = next((n for n in ("SCAL", "G") if n in size.names), None)
-    if name is None:
-        if {"G11", "G22"} & set(size.names):
-            ctx.fail(
-                251,
-                "sizes that depend on the direction (components {names}) are not available",
-                at=at,
-                names=" ".join(size.names),
-                hint="a field SCAL holds edge lengths, a field G their square inverses",
-            )
-        ctx.fail(
-            181,
-            "a field of sizes has the component SCAL (edge length) or G (its square inverse), not {names}",
-            at=at,
-            names=" ".join(size.names) or "none",
-        )
-    values = _everywhere(ctx, size, name, nodes, at)
-    if not (values > 0).all():
-        ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=f"{values.min():.6g}")
-    return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
-
-
-def _everywhere(ctx: Context, size: ChPoint, name: str, nodes: IntArray, at: str) -> FloatArray:
-    """Return the values of a component at nodes, all of which must have one."""
-    missing = np.setdiff1d(nodes, size.parts[name][0])
-    if len(missing):
-        ctx.fail(
-            181,
-            "the field of sizes has no value at {count} of {total} nodes",
-            at=at,
-            count=len(missing),
-            total=len(nodes),
-            hint="it must cover the whole mesh: MANU 'CHPO' or TAILLE make such a field",
-        )
-    return size.at(name, nodes)
-
-
-METRIC = {2: ("G11", "G21", "G22"), 3: ("G11", "G21", "G22", "G31", "G32", "G33")}
-"""Components of a metric by dimension: the rows of the lower triangle."""
-
-
-def metric_at(ctx: Context, size: Size, nodes: IntArray, dim: int) -> FloatArray | None:
-    """Return the metrics at nodes, (n, dim, dim), of a field that holds them (components G11 G21 G22 ...), else None.
-
-    Raises
-    ------
-    GibianeError
-        181 for a field without all the components, or that misses nodes; 41 for a metric that is not positive.
-    """
-    if not isinstance(size, ChPoint) or not {"G11", "G22"} & set(size.names):
-        return None
-    wanted = METRIC[dim]
-    if not set(wanted) <= set(size.names):
-        ctx.fail(
-            181,
-            "a metric has the components {wanted}, not {names}",
-            at="size",
-            wanted=" ".join(wanted),
-            names=" ".join(size.names),
-            hint="TAILLE 'METRIQUE' makes such a field",
-        )
-    result = np.zeros((len(nodes), dim, dim))
-    for name in wanted:
-        i, j = int(name[1]) - 1, int(name[2]) - 1
-        result[:, i, j] = result[:, j, i] = _everywhere(ctx, size, name, nodes, "size")
-    finite = np.isfinite(result).all(axis=(1, 2), keepdims=True)
-    bad = np.linalg.eigvalsh(np.where(finite, result, 0.0))[:, 0] <= 0
-    if bad.any():
-        ctx.fail(
-            41,
-            "a metric has positive lengths in every direction: that of {count} nodes has not",
-            at="size",
-            count=int(bad.sum()),
-            hint="G11 G22 - G21**2 and G11 are above 0; a size h in every direction is G11 = G22 = 1/h**2"
-            if dim == 2
-            else "a size h in every direction is G11 = G22 = G33 = 1/h**2",
-        )
-    return result
 
 
 def numbered(ctx: Context, cells: list[IntArray]) -> tuple[IntArray, list[IntArray]]:

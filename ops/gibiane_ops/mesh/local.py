@@ -20,8 +20,8 @@ from gibiane_ops.kernels.mesh import unions
 from gibiane_ops.kernels.mesh.hosts import find_hosts
 from gibiane_ops.mesh.building import dimension, explained, join, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import LINEAR, linear_mesh, quadratic_mesh
-from gibiane_ops.mesh.filling import sizes_at
 from gibiane_ops.mesh.groups import Groups
+from gibiane_ops.mesh.wanted import refuse_too_many, sizes_at
 from gibiane_ops.values.arbre import Arbre
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.maillage import Block, Maillage, Point
@@ -80,6 +80,7 @@ def divide(
         mesh, new = before, ids
     else:
         sizes = np.broadcast_to(np.asarray(sizes_at(ctx, size, ids), np.float64), len(ids))
+        refuse_too_many(ctx, before.points, [(name, before.cells)], sizes)
         with explained(ctx, "g"):
             state, _ = adapted(state, sizes)
             mesh = state.mesh()

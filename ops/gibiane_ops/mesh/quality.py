@@ -11,7 +11,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import quality
 from gibiane_ops.mesh.building import nodes_of
 from gibiane_ops.mesh.degree import linear_mesh
-from gibiane_ops.mesh.filling import Size, metric_at, sizes_at
+from gibiane_ops.mesh.wanted import Size, metric_at, sizes_at
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage

@@ -15,9 +15,10 @@ from gibiane_ops.kernels.errors import MeshingFailed
 from gibiane_ops.kernels.mesh import quality, unions
 from gibiane_ops.mesh.building import dimension, explained, new_mesh, nodes_of
 from gibiane_ops.mesh.degree import finished, is_quadratic, linear_mesh
-from gibiane_ops.mesh.filling import fill_contour, fill_envelope, metric_at, sizes_at
+from gibiane_ops.mesh.filling import fill_contour, fill_envelope
 from gibiane_ops.mesh.groups import Groups
 from gibiane_ops.mesh.local import divide, move_nodes
+from gibiane_ops.mesh.wanted import metric_at, refuse_too_many, sizes_at
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.maillage import Maillage
 
@@ -85,18 +86,23 @@ def _remesh(
             at="g",
             wanted=wanted,
             shapes=" ".join(g.shapes) or "no element",
-            hint="CHAN {wanted} cuts other elements",
+            hint="ELEM '{wanted}' takes them alone"
+            if set(g.shapes) <= {wanted, "POI1", "SEG2", "TRI3"}
+            else "CHAN {wanted} cuts other elements",
         )
     store = nodes_of(ctx)
     nodes = g.nodes
     metric = metric_at(ctx, size, nodes, dim)
     sizes = sizes_at(ctx, size, nodes) if metric is None else metric
+    equal = sizes if metric is None else np.linalg.det(metric) ** (-0.5 / dim)
+    points, cells = store.coords[nodes][:, :dim], np.searchsorted(nodes, block.cells)
+    refuse_too_many(ctx, points, [(wanted, cells)], np.asarray(equal, np.float64))
     groups = Groups(ctx, grou if grou is not None else Table(), nodes)
     with explained(ctx, "g"):
         try:
             result = remesh(
-                store.coords[nodes][:, :dim],
-                np.searchsorted(nodes, block.cells),
+                points,
+                cells,
                 np.asarray(sizes, np.float64),
                 groups=groups.cells,
                 pairs=groups.pairs,
@@ -108,7 +114,7 @@ def _remesh(
             return old, grou if grou is not None else Table()
     from scipy.spatial import cKDTree
 
-    _, near = cKDTree(store.coords[nodes][:, :dim]).query(result.points)
+    _, near = cKDTree(points).query(result.points)
     ids = store.add(result.points, store.density[nodes][near])
     if metric is None:
         _warn_flat(ctx, result.points, result.cells)
@@ -212,6 +218,7 @@ def _has_these_sizes(ctx: Context, g: Maillage, size: float | ChPoint) -> bool:
     points = nodes_of(ctx).coords[nodes][:, : dimension(ctx)]
     cells = np.searchsorted(nodes, block.cells)
     wanted = np.broadcast_to(np.asarray(sizes_at(ctx, size, nodes), np.float64), len(nodes))
+    refuse_too_many(ctx, points, [(block.shape, cells)], wanted)
     present = element_sizes(of, np.abs(geometry.measures(of, points[cells])))
     asked = predicted_count(points, [(block.shape, cells)], wanted)
     ratio = present / wanted[cells].mean(axis=1)

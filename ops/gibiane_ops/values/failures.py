@@ -30,6 +30,8 @@ def worded(ctx: Context, *, at: str | None = None) -> Iterator[None]:
             where=where,
             hint="its sides cross, or its corners are aligned"
             if failure.corners.shape[2] == 2
+            else "its corners lie in one plane: move a node, or take the element out (DIFF)"
+            if failure.volumes[0] == 0 and failure.shape == "TET4"
             else "its nodes turn the wrong way: ORIE turns elements round, INVE lines",
         )
     except k.BadValue as failure:

@@ -17,7 +17,7 @@ def error_map(ctx: Context, field: MChaml, zones: list[ModelZone]) -> FloatArray
     Raises
     ------
     GibianeError
-        236 when the component cannot be chosen, 1012 for numbers that are not finite.
+        236 when the component cannot be chosen, 1012 for numbers that are not finite, 41 for negative ones.
     """
     name = "TOTA" if "TOTA" in field.names else field.names[0] if len(field.names) == 1 else None
     if name is None:
@@ -35,6 +35,14 @@ def error_map(ctx: Context, field: MChaml, zones: list[ModelZone]) -> FloatArray
             at="carte",
             count=int((~np.isfinite(found)).sum()),
             hint="they come from the stress: MAXI and MINI of each component show where",
+        )
+    if (found < 0).any():
+        ctx.fail(
+            41,
+            "an error is not negative: {count} values of the map are, down to {least}",
+            at="carte",
+            count=int((found < 0).sum()),
+            least=f"{found.min():.3g}",
         )
     return found
 

@@ -1,7 +1,5 @@
 """Tetrahedra made to a metric by Mmg: long where the metric says so, on the same domain, with the same groups."""
 
-import builtins
-
 import numpy as np
 import pytest
 from simplices import grid, outer, round_block, two_blocks
@@ -9,8 +7,8 @@ from simplices import grid, outer, round_block, two_blocks
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.adapt import metric
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.errors import MissingPackage
-from gibiane_ops.kernels.remesh import remesh
+from gibiane_ops.kernels.errors import MeshingFailed, MissingPackage
+from gibiane_ops.kernels.remesh import mmg, remesh
 from gibiane_ops.kernels.remesh.skeleton import build_skeleton
 
 TET, TRI, FINE = shape("TET4"), shape("TRI3"), shape("TE10")
@@ -19,7 +17,7 @@ WIDTH = 0.05
 
 
 @pytest.fixture(autouse=True)
-def mmg():
+def package():
     pytest.importorskip("mmgpy", reason="SKIPPED: METRICS IN SPACE ARE NOT TESTED, pip install 'gibiane[mmg]'")
 
 
@@ -131,13 +129,26 @@ def test_long_facets_of_a_plane_stay_one_face(blocks):
 
 def test_a_missing_package_is_named(monkeypatch):
     points, cells = grid(1, 1.0, 0.0)
-    real = builtins.__import__
-
-    def broken(name, *rest, **more):
-        if name == "mmgpy":
-            raise ImportError(name)
-        return real(name, *rest, **more)
-
-    monkeypatch.setattr(builtins, "__import__", broken)
+    monkeypatch.setattr(mmg, "find_spec", lambda name: None)
     with pytest.raises(MissingPackage, match=r"gibiane\[mmg\]"):
         remesh(points, cells, np.broadcast_to(np.eye(3), (len(points), 3, 3)))
+
+
+def test_what_ends_mmg_is_told(monkeypatch, tmp_path):
+    points, cells = grid(1, 1.0, 0.0)
+    M = np.broadcast_to(np.eye(3), (len(points), 3, 3))
+    monkeypatch.setattr(mmg, "WORKER", tmp_path / "worker.py")
+    for program, words in (
+        ("import sys; sys.exit('## Error: no luck')", "no luck"),
+        ("import os; os.abort()", "ended with code"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGXCPU)", "did not come back in 30 s"),
+    ):
+        mmg.WORKER.write_text(program)
+        with pytest.raises(MeshingFailed, match=words):
+            remesh(points, cells, M)
+
+
+def test_overlapping_elements_are_refused():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.2, 0.2, 0.9]])
+    with pytest.raises(MeshingFailed, match="elements 1 and 2 of the old mesh overlap"):
+        remesh(points, np.array([[0, 1, 2, 3], [0, 1, 2, 4]]), np.broadcast_to(9 * np.eye(3), (5, 3, 3)))

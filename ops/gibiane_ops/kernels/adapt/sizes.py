@@ -308,8 +308,8 @@ def size_map(
     Notes
     -----
     Averaging to the nodes smooths the sizes and so changes the number of elements that they ask for; the nodal field
-    is multiplied by one number that restores the optimum. Without any error the sizes stay as they are. Mid-nodes
-    take the mean of the two ends of their edge.
+    is multiplied by one number that restores the optimum. Without any error the sizes stay as they are; none exceeds
+    the extent of the mesh. Mid-nodes take the mean of the two ends of their edge.
     """
     orders = np.asarray(order, np.float64)
     for what, value in (("target", target), ("order", float(orders.min())), ("largest size", largest)):
@@ -340,6 +340,8 @@ def size_map(
         links = [topology.edges(blocks)] if pairs is None else [topology.edges(blocks), pairs]
         nodal = limit_growth(points, np.concatenate(links), nodal, growth)
     nodal = np.clip(nodal, smallest, np.where(np.isfinite(nodal), largest, np.inf))
+    # A size beyond that of the domain, of an error that is all but zero, says nothing.
+    nodal = np.minimum(nodal, max(float(np.ptp(points, axis=0).max()), smallest))
     count = predicted_count(points, blocks, nodal)
     if max_count is not None and count > max_count:
         nodal *= (count / max_count) ** (1 / dim)

@@ -162,8 +162,18 @@ def _pick(values: IntArray, places: IntArray) -> IntArray:
     return np.asarray(np.where(places >= 0, values[places], -1), np.int64)
 
 
-def _odd(rows: IntArray) -> IntArray:
-    """Tell the sense of each facet: 1 when an odd permutation sorts its nodes."""
+def odd_permutations(rows: IntArray) -> IntArray:
+    """Tell the sense of each facet.
+
+    Parameters
+    ----------
+    rows : (k, c) int64
+
+    Returns
+    -------
+    (k,) int64
+        1 when an odd permutation sorts its nodes, else 0.
+    """
     a = rows[:, :, None] > rows[:, None, :]
     return np.asarray(np.triu(a, 1).sum(axis=(1, 2)) % 2, np.int64)
 
@@ -182,7 +192,7 @@ def _old_faces(old: OldMesh, skeleton: Skeleton, rows: IntArray) -> IntArray:
     facets, limit = (skeleton.triangles, skeleton.patch) if skeleton.dim == 3 else _segments(skeleton)
     faces = topology.faces_of([(CELL[skeleton.dim], old.cells)])[FACET[skeleton.dim]]
     number, _ = topology.group_by_nodes(np.vstack([faces.nodes, rows]))
-    key = 2 * number + _odd(np.vstack([faces.nodes, rows]))
+    key = 2 * number + odd_permutations(np.vstack([faces.nodes, rows]))
     there, mine = key[: len(faces.nodes)], key[len(faces.nodes) :]
     place = np.full(int(key.max()) + 2, -1, np.int64)
     place[there] = faces.cell

@@ -2,18 +2,31 @@
 
 from __future__ import annotations
 
+import io
+import signal
+import subprocess
+import sys
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from gibiane_ops.kernels.adapt.metric import metric_count
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import MeshingFailed, MissingPackage
 from gibiane_ops.kernels.remesh.generate import RawMesh, corner_nodes, flatten
-from gibiane_ops.kernels.remesh.skeleton import Skeleton
+from gibiane_ops.kernels.remesh.skeleton import CELL, Skeleton
+
+WORKER = Path(__file__).with_name("mmg_worker.py")
+"""The program that runs Mmg."""
 
 STRAY = 0.003
 """Distance allowed between a curved face and its new facets, as a share of the size of the mesh."""
+
+SECONDS, SLOW = 30.0, 100.0
+"""Time of the processor after which Mmg is given up: some seconds, and some elements a second (it makes about 5000)."""
 
 SAME = 1e-9
 """Distance at which two places are one, as a share of the size of the mesh."""
@@ -25,25 +38,6 @@ UPPER = {2: ((0, 0, 1), (0, 1, 1)), 3: ((0, 0, 0, 1, 1, 2), (0, 1, 2, 1, 2, 2))}
 def mmg_is_installed() -> bool:
     """Tell whether the bindings of Mmg can be imported."""
     return find_spec("mmgpy") is not None
-
-
-def load_mmg() -> Any:
-    """Import the bindings of Mmg.
-
-    Returns
-    -------
-    module
-
-    Raises
-    ------
-    MissingPackage
-        mmgpy is not installed.
-    """
-    try:
-        import mmgpy
-    except ImportError as error:
-        raise MissingPackage("mmgpy", 'pip install "gibiane[mmg]"') from error
-    return mmgpy
 
 
 def generate_stretched(
@@ -70,7 +64,7 @@ def generate_stretched(
     Raises
     ------
     MeshingFailed
-        Mmg gave up, or lost a region, a patch, a curve or a corner.
+        Mmg gave up or died, or lost a region, a patch, a curve or a corner.
     MissingPackage
         When mmgpy is not installed.
 
@@ -80,11 +74,16 @@ def generate_stretched(
     has one reference apart from what has another; corners are required nodes. The growth of the sizes is that of the
     metric. The same input gives the same mesh.
 
+    Cost
+    ----
+    Half a second to begin with, then about 5000 tetrahedra a second, two to four times (`rebuild` corrects the number).
+
     Source
     ------
     C. Dapogny, C. Dobrzynski and P. Frey, Journal of Computational Physics 262, 2014.
     """
-    mmgpy = load_mmg()
+    if not mmg_is_installed():
+        raise MissingPackage("mmgpy", 'pip install "gibiane[mmg]"')
     dim = skeleton.dim
     used, local = np.unique(cells, return_inverse=True)
     place = np.full(len(skeleton.points), -1, np.int64)
@@ -92,48 +91,60 @@ def generate_stretched(
     segments = np.vstack([np.stack([chain[:-1], chain[1:]], axis=1) for chain in skeleton.chains])
     chain = np.repeat(np.arange(len(skeleton.chains)), [len(each) - 1 for each in skeleton.chains])
     corners = corner_nodes(skeleton)
-    fixed = _int32(place[corners])
-
-    mesh = mmgpy.MmgMesh3D() if dim == 3 else mmgpy.MmgMesh2D()
-    volumes = {"tetrahedra": len(cells)} if dim == 3 else {}
-    triangles = len(skeleton.triangles)
-    mesh.set_mesh_size(vertices=len(used), triangles=triangles, edges=len(segments), **volumes)
-    mesh.set_vertices(np.ascontiguousarray(skeleton.points[used][:, :dim]))
-    # References are numbers from 1: Mmg takes 0 for "none given".
-    if dim == 3:
-        mesh.set_tetrahedra(_int32(local.reshape(cells.shape)), region + 1)
-    mesh.set_triangles(_int32(place[skeleton.triangles]), skeleton.patch + 1)
-    mesh.set_edges(_int32(place[segments]), chain + 1)
-    mesh.set_corners(fixed)
-    mesh.set_required_vertices(fixed)
-    # The bindings read the memory as it lies: a view or a transposed array would be taken for other numbers.
-    mesh["tensor"] = np.ascontiguousarray(metric[used][:, UPPER[dim][0], UPPER[dim][1]])
     size = float(np.ptp(skeleton.points[used], axis=0).max())
-    try:
-        mesh.remesh(hgrad=-1.0, hgradreq=-1.0, hausd=STRAY * size, ar=angle, verbose=-1)
-    except RuntimeError as error:
-        raise MeshingFailed(f"Mmg: {error}") from error
-    return _read(mesh, skeleton, corners, size)
+    # References are numbers from 1: Mmg takes 0 for "none given".
+    volumes = {"tetrahedra": _ids(local.reshape(cells.shape)), "region": region + 1} if dim == 3 else {}
+    new = _run(
+        {
+            "vertices": np.ascontiguousarray(skeleton.points[used][:, :dim]),
+            "triangles": _ids(place[skeleton.triangles]),
+            "patch": skeleton.patch + 1,
+            "edges": _ids(place[segments]),
+            "chain": chain + 1,
+            "corners": _ids(place[corners]),
+            # The bindings read the memory as it lies: a transposed array would be taken for other numbers.
+            "metric": np.ascontiguousarray(metric[used][:, UPPER[dim][0], UPPER[dim][1]]),
+            "stray": np.float64(STRAY * size),
+            "angle": np.float64(angle),
+            "seconds": np.int64(SECONDS + metric_count(skeleton.points[:, :dim], [(CELL[dim], cells)], metric) / SLOW),
+            **volumes,
+        }
+    )
+    return _read(new, skeleton, corners, size)
 
 
-def _int32(rows: IntArray) -> Any:
+def _ids(rows: IntArray) -> NDArray[np.int32]:
     """Copy ids as Mmg takes them."""
     return np.ascontiguousarray(rows, np.int32)
 
 
-def _read(mesh: Any, skeleton: Skeleton, corners: IntArray, size: float) -> RawMesh:
+def _run(arrays: dict[str, Any]) -> dict[str, Any]:
+    """Run Mmg in a process of its own, which it may end."""
+    given = io.BytesIO()
+    np.savez(given, **arrays)
+    done = subprocess.run([sys.executable, "-P", str(WORKER)], input=given.getvalue(), capture_output=True, check=False)
+    if done.returncode:
+        said = [line.strip(" #") for line in done.stderr.decode(errors="replace").splitlines() if line.strip()]
+        if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU) if hasattr(signal, "SIGXCPU") else False:
+            said = [f"it did not come back in {int(arrays['seconds'])} s"]
+        raise MeshingFailed("Mmg: " + (said[-1] if said else f"it ended with code {done.returncode}"))
+    with np.load(io.BytesIO(done.stdout)) as found:
+        return dict(found)
+
+
+def _read(new: dict[str, Any], skeleton: Skeleton, corners: IntArray, size: float) -> RawMesh:
     """Collect the mesh, and put nodes of plane patches and straight chains exactly where they belong."""
     dim = skeleton.dim
-    points = np.pad(np.asarray(mesh.get_vertices(), np.float64), ((0, 0), (0, 3 - dim)))
+    points = np.pad(new["vertices"], ((0, 0), (0, 3 - dim)))
 
-    def referred(pair: tuple[Any, Any]) -> tuple[IntArray, IntArray]:
+    def referred(elements: str, number: str) -> tuple[IntArray, IntArray]:
         # Sharp edges that Mmg found beside those given carry 0.
-        elements, number = (np.asarray(each, np.int64) for each in pair)
-        return elements[number > 0], number[number > 0] - 1
+        rows, which = new[elements].astype(np.int64), new[number].astype(np.int64)
+        return rows[which > 0], which[which > 0] - 1
 
-    cells, region = referred(mesh.get_tetrahedra_with_refs() if dim == 3 else mesh.get_triangles_with_refs())
-    lines, chain = referred(mesh.get_edges_with_refs())
-    facets, limit = referred(mesh.get_triangles_with_refs()) if dim == 3 else (lines, chain)
+    cells, region = referred("tetrahedra", "region") if dim == 3 else referred("triangles", "patch")
+    lines, chain = referred("edges", "chain")
+    facets, limit = referred("triangles", "patch") if dim == 3 else (lines, chain)
     for what, kept, number in (
         ("regions", region, int(skeleton.sides.max()) + 1),
         ("faces", limit, len(skeleton.borders if dim == 3 else skeleton.chains)),

@@ -14,10 +14,10 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed
 from gibiane_ops.kernels.mesh import pairing
-from gibiane_ops.kernels.remesh.carry import Contact, OldMesh, carry
+from gibiane_ops.kernels.remesh.carry import Contact, OldMesh, carry, odd_permutations
 from gibiane_ops.kernels.remesh.generate import RawMesh, generate
 from gibiane_ops.kernels.remesh.mmg import generate_stretched, mmg_is_installed
-from gibiane_ops.kernels.remesh.skeleton import CELL, Skeleton, build_skeleton, membership, regions
+from gibiane_ops.kernels.remesh.skeleton import CELL, FACET, Skeleton, build_skeleton, membership, regions
 
 FIRST_GUESS = 0.87
 """Ratio of the sizes given to the mesher to those asked, at the first trial; the next trials measure it."""
@@ -27,6 +27,9 @@ FIRST_GUESS_MMG = 1.15
 
 AIM, LOWEST = 0.98, 0.95
 """The number of elements aimed at, and the least accepted, as shares of the number asked (never exceeded)."""
+
+FLAT = 1e-16
+"""Measure of an old element, over that of the box of the mesh, below which it is flat."""
 
 TRIALS = 5
 
@@ -99,7 +102,7 @@ def remesh(
         Sizes not positive; a group that is not made of elements of the mesh, its boundary or limits of its groups; a
         pair whose nodes do not match or that joins a solid with itself.
     MeshingFailed
-        The mesher failed, or its mesh does not fill the old domain.
+        The mesher failed, its mesh does not fill the old domain, or old cells are flat or overlap.
     MissingPackage, MissingSystemLibrary
         When gmsh cannot be used, or for a metric in space Mmg.
 
@@ -125,6 +128,14 @@ def remesh(
     if not (np.isfinite(nodal[used]).all() and (nodal[used] > 0).all()):
         raise BadValue("size", float(nodal[used].min()), "finite and positive")
 
+    signed = geometry.measures(shape(CELL[dim]), points[cells])
+    volume = np.abs(signed)
+    flat = np.flatnonzero(volume <= FLAT * float(np.ptp(points[used], axis=0).max()) ** dim)
+    if len(flat):
+        which = " ".join(str(k + 1) for k in flat[:5].tolist()) + (" ..." if len(flat) > 5 else "")
+        raise MeshingFailed(f"elements of the old mesh are flat: {which}")
+
+    _check_sides(cells, signed)
     solid = topology.solids([(CELL[dim], cells)], len(points))[1]
     merged, owners = pairing.merged_nodes(points, solid, named, pairs)
     contacts = [Contact(*names, both) for names, both in zip(pairs, owners, strict=True)]
@@ -162,11 +173,25 @@ def remesh(
 
     raw, counts = _mesh_to_count(mesher, field, wanted, dim, FIRST_GUESS_MMG if by_mmg else FIRST_GUESS)
     volumes = geometry.measures(shape(CELL[dim]), raw.points[raw.cells][:, :, :dim])
-    _check_measures(skeleton, np.abs(geometry.measures(shape(CELL[dim]), points[cells])), np.abs(volumes))
+    _check_measures(skeleton, volume, np.abs(volumes))
     turned = np.where((volumes < 0)[:, None], raw.cells[:, [1, 0, *range(2, dim + 1)]], raw.cells)
     old = OldMesh(cells, region, solid, merged, named, contacts)
     new = carry(old, skeleton, replace(raw, cells=turned))
     return Remeshed(raw.points[new.source][:, :dim], new.cells, new.groups, new.pairs, wanted, counts)
+
+
+def _check_sides(cells: IntArray, signed: FloatArray) -> None:
+    """Refuse two cells on one side of their common face: a mesher may end or never come back."""
+    dim = cells.shape[1] - 1
+    turned = np.where((signed < 0)[:, None], cells[:, [1, 0, *range(2, dim + 1)]], cells)
+    faces = topology.faces_of([(CELL[dim], turned)])[FACET[dim]]
+    number, _ = topology.group_by_nodes(faces.nodes)
+    total = np.bincount(number)
+    odd = np.bincount(number, odd_permutations(faces.nodes))
+    bad = np.flatnonzero((total > 2) | ((total == 2) & (odd != 1)))
+    if len(bad):
+        pair = " and ".join(str(k + 1) for k in np.sort(faces.cell[number == bad[0]])[:2].tolist())
+        raise MeshingFailed(f"elements {pair} of the old mesh overlap: they lie on one side of their common face")
 
 
 def _equal_sizes(metric: FloatArray) -> FloatArray:
