@@ -125,7 +125,7 @@ def _run(arrays: dict[str, Any]) -> dict[str, Any]:
     done = subprocess.run([sys.executable, "-P", str(WORKER)], input=given.getvalue(), capture_output=True, check=False)
     if done.returncode:
         said = [line.strip(" #") for line in done.stderr.decode(errors="replace").splitlines() if line.strip()]
-        if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU) if hasattr(signal, "SIGXCPU") else False:
+        if done.returncode == -getattr(signal, "SIGXCPU", 0):
             said = [f"it did not come back in {int(arrays['seconds'])} s"]
         raise MeshingFailed("Mmg: " + (said[-1] if said else f"it ended with code {done.returncode}"))
     with np.load(io.BytesIO(done.stdout)) as found:

@@ -26,7 +26,7 @@ def main() -> int:
         old = dict(given)
     if resource is not None:
         seconds = int(old["seconds"])
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
     space = "tetrahedra" in old
     mesh = mmgpy.MmgMesh3D() if space else mmgpy.MmgMesh2D()
     volumes = {"tetrahedra": len(old["tetrahedra"])} if space else {}
