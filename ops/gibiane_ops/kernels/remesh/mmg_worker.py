@@ -7,6 +7,7 @@ die and may be interrupted. This file is run as it stands and imports nothing of
 import io
 import os
 import sys
+from typing import Any
 
 try:
     import resource
@@ -28,7 +29,7 @@ def main() -> int:
         seconds = int(old["seconds"])
         resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 5))
     space = "tetrahedra" in old
-    mesh = mmgpy.MmgMesh3D() if space else mmgpy.MmgMesh2D()
+    mesh: Any = mmgpy.MmgMesh3D() if space else mmgpy.MmgMesh2D()
     volumes = {"tetrahedra": len(old["tetrahedra"])} if space else {}
     mesh.set_mesh_size(
         vertices=len(old["vertices"]), triangles=len(old["triangles"]), edges=len(old["edges"]), **volumes
@@ -46,7 +47,7 @@ def main() -> int:
     except RuntimeError as error:
         print(error, file=sys.stderr)
         return 1
-    new = {"vertices": mesh.get_vertices()}
+    new: dict[str, Any] = {"vertices": mesh.get_vertices()}
     if space:
         new["tetrahedra"], new["region"] = mesh.get_tetrahedra_with_refs()
     new["triangles"], new["patch"] = mesh.get_triangles_with_refs()

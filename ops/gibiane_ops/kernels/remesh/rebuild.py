@@ -160,8 +160,8 @@ def remesh(
         wanted = float(count)
     field = common
     if given.ndim == 3:
-        flat = given.reshape(len(points), -1)
-        mean = np.stack([_group_mean(flat[:, k], merged, used) for k in range(dim * dim)], axis=1)
+        rows = given.reshape(len(points), -1)
+        mean = np.stack([_group_mean(rows[:, k], merged, used) for k in range(dim * dim)], axis=1)
         field = mean.reshape(given.shape)
 
     by_mmg = given.ndim == 3 and (dim == 3 or mmg_is_installed())
