@@ -72,6 +72,27 @@ def test_equals_the_exact_stiffness(name, mu, method, one_ring):
     close(bodies, B.F, mu)
 
 
+@pytest.mark.parametrize("method", ["auto", "single", "amg"])
+@pytest.mark.parametrize(("name", "mu"), [("T1_1", 0.2), ("T1_1h", 0.05)])
+def test_stopped_early_within_what_was_asked(name, mu, method, one_ring):
+    solutions, passes = [], []
+    for share in (0.0, 1e-4, 1e-2):
+        B, bodies = bodies_of(name, method)
+        load = bodies.load(B.F)
+        before = bodies.tied.passes
+        enough = share * np.sqrt(solutions[0] @ B.K @ solutions[0]) if share else 0.0
+        found = solve_corrected(
+            bodies, load, bodies.gaps(load, None, None), lambda each: solve_coulomb(each, mu), enough=enough
+        )
+        solutions.append(found.displacement)
+        passes.append(bodies.tied.passes - before)
+        away = found.displacement - solutions[0]
+        assert np.sqrt(away @ B.K @ away) <= enough
+        assert found.left <= enough
+    assert passes == sorted(passes, reverse=True)
+    assert passes[-1] < passes[0]
+
+
 @pytest.mark.parametrize("contrast", [1e-3, 1e3])
 def test_stiffness_contrast(contrast):
     B, bodies = bodies_of("T1_1", contrast=contrast)

@@ -123,7 +123,7 @@ def solve_corrected(
     again : callable, optional
         The method from the state before, for the passes after the first; their steps are added to its history.
     enough : float
-        Estimate of ``solver_error`` below which the corrections stop early; 0 never.
+        Estimate of ``solver_error``, with what the solutions leave, below which the corrections stop early; 0 never.
     slip_origin : (n, d - 1) float64, optional
         For that estimate.
     tell : callable, optional
@@ -183,15 +183,16 @@ def solve_corrected(
             break
         if enough:
             error = solver_error(interface, state, slip_origin)
-            if error is not None and error < enough:
-                left = error
+            if error is not None and error + follower.missed < enough:
+                left = error + follower.missed
                 break
         recent = differences[-PATIENCE:]
         if len(differences) >= MOST or (
             len(differences) > PATIENCE and min(recent) > 0.5 * min(differences[:-PATIENCE])
         ):
             raise Stalled(differences, state)
-    follower.settle()
+    if not left:
+        follower.settle()
     report = replace(state.report, balance=max(state.report.balance, differences[-1]))
     displacement = bodies.displacement(load, follower.w, follower.x)
     bodies.remember(follower.w, follower.x)

@@ -20,6 +20,9 @@ PARTLY = 1e-5
 ENTIRELY = 1e-12
 """And that of the result, over the load."""
 
+CAUTION = 10.0
+"""What a solution leaves in energy norm, over its residual in the mean square, is at most this much more."""
+
 
 class Follower:
     """The bodies themselves, that follow the relative displacements of the small model.
@@ -34,6 +37,8 @@ class Follower:
         ``S w``.
     rest : (n_v,) float64
         What is left of the equations of x; each solution takes the rest of the one before with it.
+    missed : float
+        Estimate of the energy norm of what the rest leaves out of x.
     """
 
     def __init__(self, bodies: Condensation, load: TiedSolution) -> None:
@@ -42,6 +47,7 @@ class Follower:
         self._size = float(np.linalg.norm(self._tied.A @ load.x))
         self.w, self.y = np.zeros(len(load.f)), np.zeros(len(load.f))
         self.x, self.rest = np.zeros(len(load.x)), np.zeros(len(load.x))
+        self.missed = 0.0
 
     def interface(self, gap: FloatArray) -> Interface:
         """Put together the interface whose force on w is the true one, ``y - f``."""
@@ -66,9 +72,12 @@ class Follower:
         right = bodies.coupling(w)
         if not self.x.any():
             self.x = bodies.recalled(w)
-        x = self.x + tied.once(right - tied.A @ self.x)
+        before = right - tied.A @ self.x
+        x = self.x + tied.once(before)
         x = x + bodies.small().solve(right - tied.A @ x)
-        self.w, self.x, self.rest = w, x, right - tied.A @ x
+        rest = right - tied.A @ x
+        self.missed = _left(before, rest, x - self.x)
+        self.w, self.x, self.rest = w, x, rest
         self.y = bodies.learned.still(bodies.force(w, x))
 
     def settle(self) -> bool:
@@ -90,7 +99,16 @@ class Follower:
         """Solve for the rest, to a relative residual, and add a change of w whose force the rest holds."""
         dx = self._tied.once(self.rest, tolerance)
         self.x = self.x + dx
-        self.rest = self.rest - self._tied.A @ dx
+        before, self.rest = self.rest, self.rest - self._tied.A @ dx
+        self.missed = _left(before, self.rest, dx)
         learned = self._bodies.learned
         assert learned is not None
         self.y = self.y + learned.still(self._bodies.force(dw, dx))
+
+
+def _left(before: FloatArray, after: FloatArray, dx: FloatArray) -> float:
+    """Estimate the energy norm of what a solution dx for one rest leaves, from the rest after it."""
+    size = float(np.linalg.norm(before))
+    if size == 0:
+        return 0.0
+    return CAUTION * float(np.linalg.norm(after)) / size * max(float(before @ dx), 0.0) ** 0.5
