@@ -111,4 +111,4 @@ def _left(before: FloatArray, after: FloatArray, dx: FloatArray) -> float:
     size = float(np.linalg.norm(before))
     if size == 0:
         return 0.0
-    return CAUTION * float(np.linalg.norm(after)) / size * max(float(before @ dx), 0.0) ** 0.5
+    return CAUTION * float(np.linalg.norm(after)) / size * float(np.sqrt(max(float(before @ dx), 0.0)))
