@@ -35,7 +35,7 @@ def passes(name, error):
     out = io.StringIO()
     session = Session(out=out, err=io.StringIO())
     method, before = RUNS[name]
-    assert session.run_text(f"{MEASURED} {before} T2 = ADAPTER T1 'PREC' {error} 'METH' '{method}' 'NPAS' 10 ;") < 8
+    assert session.run_text(f"{MEASURED} {before} T2 = ADAPTER T1 'PREC' {error} 'METH' '{method}' 'NPAS' 14 ;") < 8
     rows = [line.split()[1:] for line in out.getvalue().splitlines() if line.startswith("PASS")]
     nodes, energy = np.array(rows, float).T
     found = session.names()["T2"]
