@@ -84,5 +84,6 @@ def test_raising_alone_leaves_the_corner_as_it_is():
 
 
 def test_the_estimate_that_stops_hp_is_near_the_true_error():
+    """Effectivity within 0.8 and 1.2 near the end; coarse meshes of both degrees overestimate, by up to 1.3."""
     _, errors, estimated, _ = passes("hp", 0.01)
-    assert estimated[2:] / errors[2:] == pytest.approx(1.0, abs=0.25), estimated / errors
+    assert estimated[-3:] / errors[-3:] == pytest.approx(np.ones(3), abs=0.2)
