@@ -1,4 +1,4 @@
-"""Rigid motions of a contact interface: what slides freely, and the names of motions that nothing prevents."""
+"""Axes of contact pairs, and rigid motions of an interface: what slides freely, what nothing prevents."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from interfaces import bare_interface
 
 from gibiane_ops.kernels.contact.balance import kind_of_motion
 from gibiane_ops.kernels.contact.drift import without_drift
+from gibiane_ops.kernels.contact.frames import local_frames
 
 SLIDE = np.array([0.0, 1.0, 0.0, 1.0]) / np.sqrt(2)
 LIFT = np.array([1.0, 0.0, 1.0, 0.0]) / np.sqrt(2)
@@ -46,3 +47,17 @@ def test_a_motion_that_changes_a_gap_a_little_is_no_drift() -> None:
 )
 def test_kinds_of_motion(motion, kind) -> None:
     assert kind_of_motion(np.array(motion), np.full(2, 0.3)) == kind
+
+
+@pytest.mark.parametrize(
+    ("normal", "first"),
+    [([0, 0, 1], [1, 0, 0]), ([0, 1, 0], [-1, 0, 0]), ([1, 0, 0], [0, 0, -1]), ([0.1, 0.05, 0.99], [0.99, 0, -0.1])],
+)
+def test_tangents_without_supports(normal, first) -> None:
+    """The first is x where the normal is z; neighbours on a surface that turns little have the like."""
+    n = np.array([normal]) / np.linalg.norm(normal)
+    frames, active, shortening = local_frames(n, np.full((1, 3), True))
+    t1 = np.array(first) / np.linalg.norm(first)
+    assert frames[0] == pytest.approx(np.stack([n[0], t1, np.cross(n[0], t1)]))
+    assert active.all()
+    assert shortening == pytest.approx([1.0])
