@@ -277,3 +277,12 @@ def test_the_smoothness_length_of_an_exponential_is_its_decay(name):
 def test_what_the_second_degree_leaves_is_at_most_everything():
     left = shares.left_by_degree(np.array([0.1, 100.0, 0.1]), np.array([1.0, 1.0, 1.0]), np.array([False, False, True]))
     assert left == pytest.approx([0.01 / 60, 1.0, shares.LEFT_AT_PEAK])
+
+
+def test_raising_alone_counts_the_gain_of_a_node():
+    """The element that gains a little less by far fewer nodes rises first."""
+    raised, predicted = degrees.raise_only(
+        np.array([1.0, 0.9]), 1.1, left=np.zeros(2), added=np.array([10.0, 1.0]), may_rise=np.full(2, True)
+    )
+    assert raised.tolist() == [False, True]
+    assert predicted == pytest.approx(1.0)
