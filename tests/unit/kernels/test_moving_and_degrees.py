@@ -286,3 +286,17 @@ def test_raising_alone_counts_the_gain_of_a_node():
     )
     assert raised.tolist() == [False, True]
     assert predicted == pytest.approx(1.0)
+
+
+def test_steps_are_h2_g_over_w_and_at_most_a_fifth_of_the_size():
+    # Two squares of side 2 with energies 1 and 3; the common nodes see 4, the others of the first 1.
+    points = np.array([[0.0, 0], [2, 0], [4, 0], [0, 2], [2, 2], [4, 2]])
+    forces = np.zeros((6, 2))
+    forces[0], forces[1], forces[4] = [0.05, 0.0], [0.0, -0.08], [30.0, 40.0]
+    free = np.tile(np.eye(2), (6, 1, 1))
+    cells = np.array([[0, 1, 4, 3], [1, 2, 5, 4]])
+    move = moving.steps(points, [("QUA4", cells)], forces, [np.array([1.0, 3.0])], free)
+    assert move[0] == pytest.approx([-0.2, 0.0])
+    assert move[1] == pytest.approx([0.0, 0.08])
+    assert move[4] == pytest.approx([-0.24, -0.32])
+    assert np.abs(move[[2, 3, 5]]).max() == 0.0
