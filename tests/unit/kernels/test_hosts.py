@@ -76,3 +76,14 @@ def test_many_points_in_a_graded_mesh_are_all_found():
     hosts = find_hosts(points, coords, blocks)
     assert (hosts.cell >= 0).all()
     np.testing.assert_allclose(interpolated(hosts, blocks, [coords[c] for _, c in blocks]), points, atol=1e-9)
+
+
+def test_a_curved_side_reaches_beyond_its_nodes():
+    """The lowest point of a parabola between nodes at 0, -0.2 and -0.19 is below them all."""
+    coords = np.array([[-1.0, 0], [1, -0.19], [1, 1], [-1, 1], [0, -0.2], [1, 0.4], [0, 1], [-1, 0.5]])
+    xi = np.array([[0.45, -0.999]])
+    point = shape("QUA8").N(xi) @ coords
+    assert point[0, 1] < coords[:, 1].min() - 0.01
+    hosts = find_hosts(point, coords, [("QUA8", np.arange(8)[None])])
+    assert hosts.cell.tolist() == [0]
+    assert hosts.xi[0, :2] == pytest.approx(xi[0], abs=1e-8)
