@@ -19,6 +19,7 @@ from gibiane_ops.kernels.adapt.sizes import predicted_count, size_map
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.geometry import measures
 from gibiane_ops.kernels.remesh import generate, rebuild, remesh
+from gibiane_ops.kernels.remesh.mmg import mmg_is_installed
 from gibiane_ops.kernels.remesh.skeleton import build_skeleton
 
 pytestmark = pytest.mark.bench
@@ -85,6 +86,26 @@ def test_remesh_against_gmsh(bench):
     gmsh()
     size = f"{found['cells']} of {wanted:.0f} TET4"
     bench.compare("REMAILLER (peer: gmsh once, same field)", size, ours, {"gmsh": gmsh}, aim=1.5)
+
+
+def test_remesh_to_a_metric(bench):
+    """Long tetrahedra by Mmg beside as many of equal sides by gmsh."""
+    if not mmg_is_installed():
+        bench.skipped("Mmg", "gibiane[mmg]")
+        return
+    points, cells = cube(6)
+    size = 0.06 + 0.1 * np.abs(points[:, 0] - 0.5)
+    M = np.einsum("n,ij->nij", size**-2, np.diag([1.0, 1 / 9, 1 / 9]))
+    found = {}
+
+    def ours():
+        found["cells"] = len(remesh(points, cells, M).cells)
+
+    def gmsh():
+        remesh(points, cells, np.linalg.det(M) ** (-1 / 6))
+
+    ours()
+    bench.compare("REMAILLER to a metric (peer: equal sides)", f"{found['cells']} TET4", ours, {"gmsh": gmsh})
 
 
 WORKER = """

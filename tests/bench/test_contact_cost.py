@@ -1,5 +1,6 @@
 """Contact with friction between two blocks: against one bonded solution by the same solver, and against other codes."""
 
+import copy
 import io
 import json
 import os
@@ -8,10 +9,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gibiane.session import Session
 from gibiane_ops.kernels.contact.condense import condense
+from gibiane_ops.kernels.contact.correction import solve_corrected
 from gibiane_ops.kernels.contact.law import friction
 from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.problem import Problem
@@ -159,6 +162,31 @@ def test_an_iteration_against_its_factorisation(bench, sizes):
             return solver_error(interface, state)
 
         bench.compare("estimate of the solver error", f"T1 {n}", estimate, peers, rounds=5)
+
+
+@pytest.mark.bench
+def test_corrections_that_stop_early(bench, sizes):
+    """RESO 'KRYL' 'ARRE': a small model corrected until a thousandth of the energy norm is left, and to the end."""
+    sys.path.insert(0, str(HERE.parent / "scenes"))
+    from two_blocks import blocks
+
+    for n in sizes:
+        scene = blocks(f"T1_{n}")
+        bodies = condense(scene.K, scene.pairs, scene.reduction, points=scene.points, method="single")
+        load = bodies.load(scene.F)
+        gap = bodies.gaps(load, None, None)
+
+        def corrected(enough, bodies=bodies, load=load, gap=gap):
+            # a copy has learned nothing yet
+            fresh = copy.copy(bodies)
+            return solve_corrected(fresh, load, gap, lambda each: solve_coulomb(each, 0.2), enough=enough)
+
+        u = corrected(0.0).displacement
+        enough = 1e-3 * float(np.sqrt(u @ scene.K @ u))
+        peers = {"to the end": lambda corrected=corrected: corrected(0.0)}
+        bench.compare(
+            "corrections stopped early", f"T1 {n}", lambda corrected=corrected, e=enough: corrected(e), peers, rounds=5
+        )
 
 
 def energy(found):
