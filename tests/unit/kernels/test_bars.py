@@ -54,3 +54,12 @@ def test_forces_are_the_stiffness_times_the_displacement(name: str) -> None:
 def test_a_bar_without_length_is_refused() -> None:
     with pytest.raises(InvertedElement):
         bar_stiffness(shape("SEG2"), np.zeros((1, 2, 3)), EA)
+
+
+def test_green_and_lagrange_strain_of_a_bar():
+    # From (0, 0)-(2, 0) to (0, 0)-(2.2, 0.3): (2.2^2 + 0.3^2 - 2^2) / (2 x 2^2); a rotation gives nothing.
+    of = shape("SEG2")
+    X = np.array([[[0.0, 0.0], [2.0, 0.0]]])
+    for end, expected in (([2.2, 0.3], 0.93 / 8), ([0.0, 2.0], 0.0)):
+        strain = bar_strains(of, X, np.array([[[0.0, 0.0], end]]) - X, of.gauss[0], quadratic=True)
+        assert strain == pytest.approx(expected, abs=1e-15)
