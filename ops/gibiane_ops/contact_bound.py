@@ -11,7 +11,8 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.estimate.contact_bound import ContactTractions, contact_tractions
+from gibiane_ops.kernels.estimate.bodies import loose_motions
+from gibiane_ops.kernels.estimate.contact_bound import VIOLATION, ContactTractions, contact_tractions
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
@@ -106,21 +107,18 @@ def _bound_with_contact(
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
     doubts: list[str] = []
-    joint, complete = _joint(ctx, states, pieces)
-    curable = complete and all(s.zone.law == "UNILATERAL" for s in states)
-    tensions: list[float] = []
+    joint = _joint(ctx, states, given.law, pieces)
+    nodal = True
     for state in states:
         found, squares = _tractions(ctx, state, given.law, pieces, sides, cl)
-        if curable and not found.admissible:
-            tensions.append(found.violation)
-        doubts += _doubts(state, found, curable)
+        nodal = nodal and found.nodal
+        doubts += _doubts(ctx, state, given.law, found)
         # The identity of Prager and Synge holds with twice the contact part.
         totals = shared_out(ctx, state, blocks, squares, totals)
         facets += facet_zones(ctx, state, squares, zones[0].mode)
-    solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl, joint)
-    # Tensions of the tractions that balance each node are no harm when the improved ones push everywhere.
-    if solid.tension > 0 or (tensions and sweeps == 0):
-        doubts.append(_unlawful(max([solid.tension, *tensions])))
+    solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl, joint, nodal)
+    if solid.excess > VIOLATION:
+        doubts.append(_unlawful(solid.excess))
     cutting = exact_pieces(ctx, pieces, outside)
     doubts += [cutting] if cutting else []
     guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
@@ -173,6 +171,7 @@ def _tractions(
             np.zeros(len(slave)) if state.zone.law == "TRESCA" else state.mu,
             np.zeros(len(slave)) if threshold is None else threshold,
             sure,
+            _motions(ctx, state, pieces, supports),
         )
     lost = len(cells) - add_tractions(sides, name, cells, found.traction)
     facing = partners(ctx, state)[cells]
@@ -190,49 +189,77 @@ def _tractions(
     return found, [np.bincount(o, p, len(c)).astype(np.float64) for (c, _, o), p in zip(cuts, parts, strict=True)]
 
 
-def _joint(ctx: Context, states: Sequence[SolvedContact], pieces: Pieces) -> tuple[Joint | None, bool]:
-    """Find the facets that are closed at all their nodes, without a gap in the mesh: their pressures may be improved.
+def _motions(ctx: Context, state: SolvedContact, pieces: Pieces, supports: Rigidite | None) -> FloatArray:
+    """Return the relative displacements of the pairs in the rigid motions that supports leave to each body."""
+    dim = pieces.zones[0].dim
+    points = node_store(ctx).coords[pieces.nodes][:, :dim]
+    held = held_at(*held_directions(node_store(ctx), supports, DISPLACEMENT[:dim], dim), pieces.nodes)
+    motions = loose_motions(points, pieces.cells, held)
+    slave, master = state.pairs.pairs.T
+    one, two = np.searchsorted(pieces.nodes, slave), np.searchsorted(pieces.nodes, np.maximum(master, 0))
+    return motions[:, one] - np.where((master >= 0)[:, None], motions[:, two], 0.0)
 
-    None where friction ties the bounds of the tractions to the pressures. Also tells whether all the facets that carry
-    tractions are among them.
+
+def _joint(ctx: Context, states: Sequence[SolvedContact], law: MChaml, pieces: Pieces) -> Joint | None:
+    """Find the facets that are closed at all their nodes, without a gap in the mesh: their tractions may be improved.
+
+    Their pressures, and their tangential tractions too where they stick at all their nodes; nothing where friction ties
+    the bounds of the tractions to the pressures.
     """
     dim = pieces.zones[0].dim
     points = node_store(ctx).coords[pieces.nodes][:, :dim]
-    name, facets, carrying = np.arange(len(pieces.nodes)), [np.zeros((0, dim), np.int64)], 0
+    name, facets, bounds = np.arange(len(pieces.nodes)), [np.zeros((0, dim), np.int64)], [np.zeros((0, dim))]
     for state in states:
         if state.zone.law not in ("UNILATERAL", "TRESCA"):
             continue
         slave, master = state.pairs.pairs.T
         there = np.flatnonzero(master >= 0)
         one, two = (np.searchsorted(pieces.nodes, side[there]) for side in (slave, master))
-        open_by = np.abs(state.relative[there, 0] - state.gap[there])
+        motion = state.relative[there] - np.eye(dim)[0] * state.gap[there, None]
+        still = np.abs(motion) <= CLOSED * np.abs(state.relative).max()
         size = float(np.ptp(points, axis=0).max())
-        shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[there, 0] < 0)
+        shut = still[:, 0] & (state.force[there, 0] < 0)
         shut &= np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size
         name[one[shut]] = two[shut]
-        closed, loaded = np.zeros((2, len(pieces.nodes)), bool)
+        closed, bound = np.zeros(len(pieces.nodes), bool), np.full(len(pieces.nodes), np.inf)
         closed[one[shut]] = True
-        size_of = np.linalg.norm(state.force[there], axis=1)
-        loaded[one[size_of > 1e-12 * size_of.max(initial=0.0)]] = True
+        if state.zone.law == "TRESCA":
+            stuck = still.all(axis=1)
+            threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave[there[stuck]])
+            bound[one[stuck]] = threshold
         for block in state.zone.slave.blocks:
             places, owner = pieces.facets(block.cells)
             cells = np.searchsorted(pieces.nodes, np.take_along_axis(block.cells[owner], places, axis=1))
-            facets.append(name[cells[closed[cells].all(axis=1)]])
-            carrying += int(loaded[cells].all(axis=1).sum())
+            cells = cells[closed[cells].all(axis=1)]
+            facets.append(name[cells])
+            bounds.append(np.where(np.isfinite(bound[cells]).all(axis=1)[:, None], bound[cells], np.inf))
     found = np.concatenate(facets)
-    return (Joint(name, found) if len(found) else None), len(found) == carrying > 0
+    return Joint(name, found, np.concatenate(bounds)) if len(found) else None
 
 
 def _unlawful(violation: float) -> str:
     return f"no contact tractions in balance obey the law: it is left by {violation:.2g}"
 
 
-def _doubts(state: SolvedContact, found: ContactTractions, curable: bool) -> list[str]:
+def _doubts(ctx: Context, state: SolvedContact, law: MChaml, found: ContactTractions) -> list[str]:
     """Say what keeps the contact of a zone from being part of a bound."""
     doubts = []
-    if state.zone.law not in ("UNILATERAL", "TRESCA") and (state.mu > 0).any():
+    slave, values = state.pairs.pairs[:, 0], law.zone_of(state.zone)
+    size = float(np.abs(state.force).max(initial=0.0))
+    convex = state.zone.law in ("UNILATERAL", "TRESCA")
+    if not convex and ((state.mu > 0).any() or np.abs(state.force[:, 1:]).max(initial=0.0) > CLOSED * size):
         doubts.append("Coulomb" if state.zone.law == "COULOMB" else f"friction law {state.zone.law}")
-    if not found.admissible and not curable:
+    adhesion = nodal_property(ctx, values, "ADHE", slave)
+    if adhesion is not None and (adhesion > 0).any():
+        doubts.append("adhesion")
+    open_by = state.gap - state.relative[:, 0]
+    far = CLOSED * float(np.abs(state.relative).max(initial=0.0))
+    if (-open_by).max(initial=0.0) > max(far, CLOSED * float(np.abs(state.gap).max(initial=0.0))):
+        doubts.append(f"the bodies overlap by {-open_by.min():.2g}")
+    threshold = nodal_property(ctx, values, "SEUI", slave) if state.zone.law == "TRESCA" else None
+    if threshold is not None and ((open_by > far) & (threshold > 0)).any():
+        doubts.append("Tresca's bound on pairs that are open, where it jumps to zero")
+    if not found.admissible:
         doubts.append(_unlawful(found.violation))
     if found.flatness > FLAT:
         doubts.append("the contact surface is not plane")

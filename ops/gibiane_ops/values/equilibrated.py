@@ -13,7 +13,7 @@ from gibiane_ops.kernels.errors import NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.kernels.estimate.macro import STATIC
-from gibiane_ops.kernels.estimate.pieces import Aim, aim_of, balanced_stress
+from gibiane_ops.kernels.estimate.pieces import Aim, aim_of, balanced_stress, uniform_aim
 from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
 from gibiane_ops.kernels.estimate.zz import SolidError
@@ -81,8 +81,12 @@ def equilibrated(
     sweeps: int | None,
     supports: Rigidite | None,
     joint: Joint | None = None,
+    nodal: bool = True,
 ) -> Admissible:
-    """Build the stress in equilibrium over all the zones together: they exchange tractions where they share nodes."""
+    """Build the stress in equilibrium over all the zones together: they exchange tractions where they share nodes.
+
+    Not `nodal`: the tractions of contact do not balance each node, and the stress to start from is corrected to do so.
+    """
     zones = pieces.zones
     dim = zones[0].dim
     if sweeps is not None and sweeps < 0:
@@ -90,14 +94,14 @@ def equilibrated(
     body = np.zeros(dim) if volu is None else volu.coords[:dim]
     count = SWEEPS if sweeps is None else sweeps
     points = node_store(ctx).coords[pieces.nodes][:, :dim]
-    laws, nodal, means = [], [], []
+    laws, at_nodes, means = [], [], []
     for zone, owner, corners in zip(zones, pieces.owner, pieces.corners, strict=True):
         of = shape(zone.shape)
         values = on_zone(ctx, stress, zone, "sig").values
         law = elastic_law(ctx, material, zone, "mat")
         laws.append(np.broadcast_to(law, (len(zone.cells), *2 * values.shape[2:]))[owner])
-        nodal.append(moved(of, values, stress.support, "NOEUD")[owner])
-        means.append(np.take_along_axis(nodal[-1], corners[:, :, None], axis=1).mean(axis=1))
+        at_nodes.append(moved(of, values, stress.support, "NOEUD")[owner])
+        means.append(np.take_along_axis(at_nodes[-1], corners[:, :, None], axis=1).mean(axis=1))
     cells = np.concatenate(
         [
             np.take_along_axis(c[owner], corners, axis=1)
@@ -110,8 +114,11 @@ def equilibrated(
         traction, free = _on_boundary(side, pieces.nodes, mesh.nodes[mesh.boundary])
         loads = Exterior(traction, free, np.tile(body, (len(cells), 1)))
         aim = None
-        if not pieces.whole:
-            aim = _aim(pieces, mesh, cells, nodal, plane_compliance(law, dim))
+        if not (pieces.whole and nodal):
+            if pieces.whole:
+                aim = uniform_aim(sigma[:, STATIC[dim]], dim)
+            else:
+                aim = _aim(pieces, mesh, cells, at_nodes, plane_compliance(law, dim))
             known, held = held_directions(node_store(ctx), supports, DISPLACEMENTS[zones[0].family], dim)
             with worded(ctx, at="sig"):
                 sigma = balanced_stress(mesh, sigma, law, loads, held_at(known, held, pieces.nodes))

@@ -20,9 +20,6 @@ SWEEPS = 2
 
 CHUNK = 4096
 
-CLEANINGS = 20
-"""Largest number of visits to the contact facets that pull."""
-
 
 @dataclass(frozen=True, eq=False)
 class Admissible:
@@ -43,8 +40,9 @@ class Admissible:
         Estimate after the balance of tractions and after each sweep.
     residual : float
         Largest violation of equilibrium found in the stress, relative, see `equilibrium_residual`.
-    tension : float
-        Largest tension on the contact facets of a joint, over the largest traction there; not positive when all push.
+    excess : float
+        Largest violation of the law of contact on the facets of a joint, over the largest traction there; not positive
+        within the law.
     """
 
     mesh: Simplices
@@ -54,7 +52,7 @@ class Admissible:
     sum_energy: FloatArray
     history: list[float]
     residual: float
-    tension: float = 0.0
+    excess: float = 0.0
 
     @property
     def total(self) -> float:
@@ -109,15 +107,14 @@ def admissible_stress(
     exterior : Exterior
         Loads and supports, on the sides ``simplices(points, cells).boundary``.
     sweeps : int
-        Improvements: in space star by star, in a plane of the whole at once, where one reaches the least estimate
-        (more of them only help contact facets that pull).
+        Improvements: in space star by star, in a plane of the whole at once, where one reaches the least estimate.
     mesh : Simplices, optional
         That of the same points and cells, when it is at hand.
     aim : Aim, optional
         The finite-element stress to which the distance is taken, when the cells are pieces of its elements; `stress`
         then only has to balance the loads at the nodes.
     joint : Joint, optional
-        Contact facets whose pressures, given with the loads, may be improved too.
+        Contact facets whose tractions, given with the loads, may be improved too within the law.
 
     Returns
     -------
@@ -161,54 +158,33 @@ def admissible_stress(
             found -= 2 * sign * (pull * jumps(mesh, tau, sign * sigma).reshape(len(pull), -1)).sum(axis=1)
         return np.maximum(found + constant, 0.0)
 
-    history, tension = [float(np.sqrt(distance(1.0).sum()))], 0.0
+    history, excess = [float(np.sqrt(distance(1.0).sum()))], 0.0
     if sweeps:
         free = np.broadcast_to(np.eye(dim), (len(mesh.nodes), dim, dim)).copy()
         free[mesh.boundary] = exterior.free
         joined = Joined(mesh, joint) if joint is not None and len(joint.closed) else None
-        if joined is None and dim == 2:
-            improve_whole(mesh, sigma, compliance, free, tau, pull)
-            history.append(float(np.sqrt(distance(1.0).sum())))
-        elif joined is None:
-            improver = Improver(mesh, sigma, compliance, free, pull)
-            for _ in range(sweeps):
-                improver.sweep(tau)
-                history.append(float(np.sqrt(distance(1.0).sum())))
-        else:
+        on, together, limits, turned_pull = mesh, tau, None, pull
+        if joined is not None:
+            on, together, free = joined.mesh, joined.taken(tau), joined.free(free)
+            limits = joined.limits(together)
             turned_pull = None if pull is None else joined.turned(pull)
-            together = joined.taken(tau)
-            first, pressed = together.copy(), (joined.normal, joined.margin(together))
-            improver = Improver(joined.mesh, sigma, compliance, joined.free(free), turned_pull, pressed)
-            for sweep in range(sweeps):
-                if dim == 2 and sweep == 0:
-                    improve_whole(joined.mesh, sigma, compliance, joined.free(free), together, turned_pull)
-                else:
-                    improver.sweep(together)
-                _compressed(joined, improver, together)
-                tau = joined.given_back(joined.inside(first, together))
-                history.append(float(np.sqrt(distance(1.0).sum())))
-            exterior = _with_contact(joined, exterior, tau)
-            pulls = joined.tension(joined.taken(tau))
-            tension = float(pulls.max() / np.abs(pulls).max())
+        improver = Improver(on, sigma, compliance, free, turned_pull, limits) if dim == 3 else None
+        for _ in range(sweeps if dim == 3 else 1):
+            if improver is None:
+                improve_whole(on, sigma, compliance, free, together, turned_pull, limits)
+            else:
+                improver.sweep(together)
+            tau = together if joined is None else joined.given_back(together)
+            history.append(float(np.sqrt(distance(1.0).sum())))
+        if joined is not None and limits is not None:
+            exterior, excess = _with_contact(joined, exterior, tau), limits.excess(together)
     energy = mesh.volume * np.einsum("ms,mst,mt->m", sigma, compliance, sigma) + constant
     residual = equilibrium_residual(mesh, tau, exterior)
-    return Admissible(mesh, tau, distance(1.0), energy, distance(-1.0), history, residual, tension)
-
-
-def _compressed(joined: Joined, improver: Improver, tau: FloatArray) -> None:
-    """Improve the stars of contact facets until none pulls, some times at most."""
-    for _ in range(CLEANINGS):
-        pulling = joined.sides[(joined.tension(tau) > 0).any(axis=1)]
-        if not len(pulling):
-            return
-        chosen = np.zeros(joined.mesh.n_stars, bool)
-        cell, local = joined.mesh.cell[pulling, 0], joined.mesh.local[pulling, 0]
-        chosen[joined.mesh.star[cell[:, None], others(joined.mesh.dim)[local]]] = True
-        improver.visit(chosen, tau)
+    return Admissible(mesh, tau, distance(1.0), energy, distance(-1.0), history, residual, excess)
 
 
 def _with_contact(joined: Joined, exterior: Exterior, tau: FloatArray) -> Exterior:
-    """Put the pressures found on contact facets among the imposed tractions."""
+    """Put the tractions found on contact facets among the imposed tractions."""
     mesh = joined.separate
     area = np.linalg.norm(mesh.outward[mesh.cell[:, 0], mesh.local[:, 0]], axis=1)
     row = np.full(len(mesh.nodes), -1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,12 @@ INSIDE = 1e-3
 DECAY = 0.98
 """Factor of that fraction from one projection to the next: where every point slips there is no room."""
 
+STALL, LESS = 200, 0.5
+"""Projections after which the excess must have fallen by this factor, or else it is given up."""
+
+PARTS = 4
+"""Parts of each edge of a facet for the lengths of slips."""
+
 VIOLATION = 1e-9
 """Largest violation of the law, over the largest traction, that is taken for round-off."""
 
@@ -44,12 +51,15 @@ class ContactTractions:
         Largest excess over the law, over the largest traction.
     flatness : float
         Largest angle (sine) between the normals of the facets and those of the nodes.
+    nodal : bool
+        Whether they balance the force of each node; if not, they balance the bodies as wholes.
     """
 
     traction: FloatArray
     facet: FloatArray
     violation: float
     flatness: float
+    nodal: bool = True
 
     @property
     def admissible(self) -> bool:
@@ -68,6 +78,7 @@ def contact_tractions(
     mu: FloatArray,
     threshold: FloatArray,
     held: BoolArray | None = None,
+    modes: FloatArray | None = None,
 ) -> ContactTractions:
     """Find contact tractions that balance nodal forces and obey the law of contact and friction.
 
@@ -92,6 +103,10 @@ def contact_tractions(
     held : (k, d) bool, optional
         Global directions in which supports hold both nodes of a pair: their reactions balance whatever contact leaves.
 
+    modes : (q, k, d) float64, length, optional
+        Relative displacements, in global axes, of the rigid motions that supports leave to each body. With them,
+        tractions that only balance each body are looked for where none balance each node, see `ContactTractions.nodal`.
+
     Returns
     -------
     ContactTractions
@@ -101,11 +116,22 @@ def contact_tractions(
     -----
     Unknowns are the tractions at the nodes of each facet, ``sum_F int_F R N_i = r_i``. A node without force leaves
     none on its facets. From the densities ``M^-1 r``, projections in turn on the balance and on the law (convex sets).
-    Lengths of slips are interpolated from the nodes, which bounds them from above.
+    Lengths of slips are interpolated from the corners of `PARTS`^2 parts of each facet, which bounds them from above.
+
+    With Tresca's bound g nodes that slip all carry g times their area; where the slips of neighbours differ in
+    direction no traction within the bound has these forces. The bound of the error does not need them: let u_h be
+    admissible, R and w the exact tractions and relative displacements, s_hat any stress in equilibrium with the loads
+    and with tractions R_hat within the law. Then
+    ``|s_hat - s_h|^2 = |s - s_hat|^2 + |u - u_h|^2 + 2 int (R_hat - R).(w - w_h)``. From ``R.w = R_n G - g |w_t|`` (the
+    law), ``R_hat.w >= R_hat_n G - g |w_t|`` (R_hat within it) and ``R.w_h >= R_n G - g |w_h_t|`` (w_h admissible) the
+    last integral is not below ``- int g |w_h_t| + R_hat_t . w_h_t + R_hat_n (w_h_n - G)``, the contact error of the
+    pair. Densities at the nodes (force over area) are within the law and do the work of the slips; they are brought to
+    balance the bodies, and the stress at hand must then be corrected to balance them (`pieces.balanced_stress`).
 
     Source
     ------
-    Coorevits, Hild and Pelle 2000; Louf, Combe and Pelle 2003.
+    Coorevits, Hild and Pelle 2000; Louf, Combe and Pelle 2003; Prager and Synge 1947; Duvaut and Lions 1972 (the
+    inequality of the law).
 
     Cost
     ----
@@ -135,32 +161,105 @@ def contact_tractions(
     bound_mu, bound_fixed = np.append(mu, 0.0)[local].ravel(), np.append(threshold, 0.0)[local].ravel()
     c = np.zeros((m * d, d))
     scale, excess = 0.0, 0.0
+    turned = rows.reshape(m * d, d, d)
     if live.any():
-        turned = rows.reshape(m * d, d, d)
         balances = [_Balance(A, np.flatnonzero(carried[:-1] & kept[:, k]), target[:, k]) for k in range(d)]
-        c = np.stack([balance.nearest(c[:, k]) for k, balance in enumerate(balances)], axis=1)
-        for turn in range(ITERATIONS):
-            inner = np.einsum("nij,nj->ni", turned, c)
-            scale = float(np.abs(inner).max())
-            excess = _excess(inner, bound_mu, bound_fixed)
-            if excess <= VIOLATION * scale:
-                break
-            inside = 1 - INSIDE * DECAY**turn
-            law = _law(inner, inside * bound_mu, inside * bound_fixed)
-            c = np.einsum("nij,ni->nj", turned, law)
-            c = np.stack([balance.nearest(c[:, k]) for k, balance in enumerate(balances)], axis=1)
+
+        def nodes_balanced(c: FloatArray) -> FloatArray:
+            return np.stack([balance.nearest(c[:, k]) for k, balance in enumerate(balances)], axis=1)
+
+        c, excess, scale = _within(nodes_balanced(c), nodes_balanced, turned, bound_mu, bound_fixed)
+    nodal = excess <= VIOLATION * scale and lost <= VIOLATION * largest
+    if not nodal and modes is not None:
+        # facets without any force go on carrying none
+        share = mass * loaded[local].any(axis=1)[:, None, None]
+        body = _Bodies(share, local, target, modes)
+        around = np.bincount(local.ravel(), share.sum(axis=2).ravel(), minlength=len(nodes) + 1)
+        density = np.vstack([target, np.zeros((1, d))]) / np.where(around > 0, around, 1.0)[:, None]
+        c = density[local].reshape(m * d, d)
+        c, excess, scale = _within(body.nearest(c), body.nearest, turned, bound_mu, bound_fixed)
+        lost = body.left(c)
     traction = c.reshape(m, d, d)
-    slip = np.append(norms(relative[:, 1:]), 0.0)[local]
     in_axes = np.einsum("maij,maj->mai", rows, traction)
     motion = np.vstack([relative, np.zeros((1, d))])[local].copy()
     motion[..., 0] = np.minimum(motion[..., 0] - np.append(gap, 0.0)[local], 0.0)
     allowed = bound_mu.reshape(m, d) * np.maximum(-in_axes[..., 0], 0.0) + bound_fixed.reshape(m, d)
-    work = np.einsum("mab,mai,mbi->m", mass, in_axes, motion) + np.einsum("mab,ma,mb->m", mass, allowed, slip)
+    at, weight = _divided(d)
+    slip = norms(np.einsum("pb,mbi->mpi", at, motion[..., 1:]).reshape(-1, d - 1)).reshape(m, -1)
+    work = np.einsum("mab,mai,mbi->m", mass, in_axes, motion) + area * np.einsum("ap,ma,mp->m", weight, allowed, slip)
     normal = geometry.facet_normals(shape("SEG2" if d == 2 else "TRI3"), points[facets])
     cosine = np.abs(np.einsum("mai,mi->ma", rows[:, :, 0], normal))[local < len(nodes)]
     flatness = float(np.sqrt(np.maximum(1 - cosine.min(initial=1.0) ** 2, 0.0)))
     violation = max(excess / scale if scale else 0.0, lost / largest if largest else 0.0)
-    return ContactTractions(traction, np.maximum(work, 0.0), violation, flatness)
+    return ContactTractions(traction, np.maximum(work, 0.0), violation, flatness, nodal or modes is None)
+
+
+def _within(
+    c: FloatArray,
+    nearest: Callable[[FloatArray], FloatArray],
+    axes: FloatArray,
+    mu: FloatArray,
+    threshold: FloatArray,
+) -> tuple[FloatArray, float, float]:
+    """Project balanced tractions in turn on the law and on their balance; also tell what is left past the law."""
+    scale, excess, before = 0.0, 0.0, np.inf
+    for turn in range(ITERATIONS):
+        inner = np.einsum("nij,nj->ni", axes, c)
+        scale = float(np.abs(inner).max(initial=0.0))
+        excess = _excess(inner, mu, threshold)
+        if excess <= VIOLATION * scale:
+            break
+        if turn % STALL == STALL - 1:
+            if excess > LESS * before:
+                break
+            before = excess
+        inside = 1 - INSIDE * DECAY**turn
+        c = nearest(np.einsum("nij,ni->nj", axes, _law(inner, inside * mu, inside * threshold)))
+    return c, excess, scale
+
+
+def _divided(d: int) -> tuple[FloatArray, FloatArray]:
+    """Return points of a facet (p, d), barycentric, and weights (d, p) of ``int f g / measure``.
+
+    For f linear, given at the corners, and g linear between the points.
+    """
+    k, M = PARTS, moments(d)
+    if d == 2:
+        points = [(k - i, i) for i in range(k + 1)]
+        parts = [[(k - i, i), (k - i - 1, i + 1)] for i in range(k)]
+    else:
+        points = [(k - i - j, i, j) for i in range(k + 1) for j in range(k + 1 - i)]
+        steps = [((0, 0, 0), (-1, 1, 0), (-1, 0, 1)), ((0, 0, 0), (-1, 0, 1), (0, -1, 1))]
+        every = [[tuple(np.add(p, s).tolist()) for s in step] for p in points for step in steps]
+        parts = [corners for corners in every if min(min(c) for c in corners) >= 0]
+    place = {p: n for n, p in enumerate(points)}
+    at, weight = np.array(points) / k, np.zeros((d, len(points)))
+    for part in parts:
+        rows = [place[c] for c in part]
+        weight[:, rows] += at[rows].T @ M / len(parts)
+    return at, weight
+
+
+class _Bodies:
+    """The tractions that do the work of the nodal forces in the rigid motions of each body."""
+
+    def __init__(self, mass: FloatArray, local: IntArray, force: FloatArray, modes: FloatArray) -> None:
+        motion = np.concatenate([modes, np.zeros((len(modes), 1, modes.shape[2]))], axis=1)[:, local]
+        self.C = np.einsum("mab,qmbi->qmai", mass, motion).reshape(
+            len(modes), mass.shape[0] * mass.shape[1] * modes.shape[2]
+        )
+        self.work = np.einsum("qki,ki->q", modes, force)
+        self.inverse = np.linalg.pinv(self.C, rcond=1e-10)
+
+    def nearest(self, c: FloatArray) -> FloatArray:
+        """Return the nearest of them to some tractions, (n, d)."""
+        for _ in range(2):
+            c = c - (self.inverse @ (self.C @ c.ravel() - self.work)).reshape(c.shape)
+        return c
+
+    def left(self, c: FloatArray) -> float:
+        """Return the largest work that tractions leave in motions of largest displacement 1, a force."""
+        return float(np.abs(self.C @ c.ravel() - self.work).max(initial=0.0))
 
 
 class _Balance:

@@ -1,4 +1,4 @@
-"""Closed contact facets as inner sides, so that the pressures there are improved with the other tractions."""
+"""Closed contact facets as inner sides, so that the tractions there are improved with the others."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.estimate.limits import MARGIN, Limits
 from gibiane_ops.kernels.estimate.simplices import Simplices, others, simplices, slots
-
-MARGIN = 1e-3
-"""Pressure that is kept on freed facets, over the mean one: less is pushed back to it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Facets in contact without friction, closed at all their nodes.
+    """Facets in contact, closed at all their nodes, whose pressures may change: those without friction, or Tresca's.
 
     Attributes
     ----------
@@ -23,10 +21,18 @@ class Joint:
         For each node the one that stands for it: nodes of a closed pair share it.
     closed : (k, d) int64
         Closed facets by the names of their nodes.
+    bound : (k, d) float64, force / length^(d - 1), optional
+        Tresca's bound at these nodes where the facet sticks at all of them, so that its tangential tractions may change
+        too; infinite where they may not, as without it.
+
+    Notes
+    -----
+    ``R . (w_h - G n)`` vanishes on such facets whatever R, so that the contact error does not change.
     """
 
     name: IntArray
     closed: IntArray
+    bound: FloatArray | None = None
 
 
 class Joined:
@@ -46,6 +52,8 @@ class Joined:
         Its sides in contact, whose pressures are free.
     normal : (n_sides, d) float64
         Unit normals there, leaving the first cell; zero elsewhere.
+    bound : (n_sides, d) float64, force
+        Largest tangential tractions at the corners of those that stick; infinite elsewhere.
     """
 
     def __init__(self, mesh: Simplices, joint: Joint) -> None:
@@ -60,13 +68,18 @@ class Joined:
         self.separate = mesh
         inner = self.mesh.cell[:, 1] >= 0
         was_boundary = mesh.cell[self._old(self.mesh.cell[:, 0], self.mesh.local[:, 0])[0], 1] < 0
-        wanted = {tuple(row) for row in np.sort(joint.closed, axis=1).tolist()}
+        order = np.argsort(joint.closed, axis=1)
+        wanted = {tuple(row): i for i, row in enumerate(np.take_along_axis(joint.closed, order, axis=1).tolist())}
         self.crossed = np.flatnonzero(inner & was_boundary)
-        kept = [tuple(row) in wanted for row in self.mesh.nodes[self.crossed].tolist()]
-        self.sides = self.crossed[np.array(kept, bool)]
+        found = np.array([wanted.get(tuple(row), -1) for row in self.mesh.nodes[self.crossed].tolist()], np.int64)
+        self.sides, rows = self.crossed[found >= 0], found[found >= 0]
         self.normal = np.zeros((len(self.mesh.nodes), dim))
         out = self.mesh.outward[self.mesh.cell[self.sides, 0], self.mesh.local[self.sides, 0]]
-        self.normal[self.sides] = out / np.linalg.norm(out, axis=1)[:, None]
+        area = np.linalg.norm(out, axis=1)
+        self.normal[self.sides] = out / area[:, None]
+        self.bound = np.full((len(self.mesh.nodes), dim), np.inf)
+        if joint.bound is not None:
+            self.bound[self.sides] = np.take_along_axis(joint.bound, order, axis=1)[rows] * area[:, None]
 
     def _old(self, cell: IntArray, local: IntArray) -> tuple[IntArray, IntArray]:
         """Return the side of the separate mesh, and the places of its corners, for sides of cells of the joined one."""
@@ -116,29 +129,14 @@ class Joined:
         found[self.crossed] = 0.0
         n = self.normal[self.sides]
         found[self.sides] = n[:, :, None] * n[:, None, :]
+        found[self.sides[np.isfinite(self.bound[self.sides]).all(axis=1)]] = np.eye(dim)
         return np.asarray(found.reshape(-1, dim, dim), np.float64)
 
-    def tension(self, tau: FloatArray) -> FloatArray:
-        """Return the normal forces at the corners of the free facets, (k, d) float64; positive in tension."""
-        return np.asarray(np.einsum("kai,ki->ka", tau[self.sides], self.normal[self.sides]), np.float64)
-
-    def margin(self, tau: FloatArray) -> FloatArray:
-        """Return what is to be kept of the pressure of each side, (n_sides,) float64, force."""
+    def limits(self, tau: FloatArray) -> Limits:
+        """Return what the law asks of the free tractions; a part of the mean pressure of `tau` is to be kept."""
         area = np.zeros(len(self.mesh.nodes))
         cell, local = self.mesh.cell[self.sides, 0], self.mesh.local[self.sides, 0]
         area[self.sides] = np.linalg.norm(self.mesh.outward[cell, local], axis=1)
-        total = float(area.sum())
-        mean = max(float(-self.tension(tau).mean(axis=1).sum()), 0.0) / total if total else 0.0
-        return MARGIN * mean * area
-
-    def inside(self, start: FloatArray, tau: FloatArray) -> FloatArray:
-        """Return the tractions nearest to the improved ones, on the way from the first ones, that are in compression.
-
-        The first ones are returned where they are in tension themselves and the improved ones too.
-        """
-        before, after = self.tension(start), self.tension(tau)
-        if after.max(initial=-1.0) <= 0 or before.max(initial=-1.0) > 0:
-            return tau
-        out = after > 0
-        step = float((before[out] / (before[out] - after[out])).min())
-        return np.asarray(start + step * (tau - start), np.float64)
+        pull = np.einsum("kai,ki->", tau[self.sides], self.normal[self.sides]) / self.mesh.dim
+        mean = max(-float(pull), 0.0) / max(float(area.sum()), np.finfo(float).tiny)
+        return Limits(self.normal, MARGIN * mean * area, self.bound)

@@ -32,6 +32,8 @@ LEFT = 1e-12
 class Aim:
     """A finite-element stress that is not uniform in the simplices.
 
+    Also the uniform stresses at hand where those to start from are others, see `uniform_aim`.
+
     Attributes
     ----------
     mean : (k, n_s) float64, force / length^2
@@ -45,6 +47,11 @@ class Aim:
     mean: FloatArray
     pull: FloatArray
     constant: FloatArray
+
+
+def uniform_aim(stress: FloatArray, dim: int) -> Aim:
+    """Return the aim of stresses that are uniform in the simplices, (k, n_s), components of `macro.STATIC`."""
+    return Aim(stress, np.zeros((len(stress), macro_element(dim).n_tractions)), np.zeros(len(stress)))
 
 
 def cut(name: str, cells: IntArray, rank: IntArray) -> tuple[IntArray, IntArray]:

@@ -1,0 +1,71 @@
+"""Rigid motions that supports leave to the bodies of a mesh: what loads on them must balance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy.sparse as sp
+
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+
+NONE = 1e-8
+"""Displacement of held nodes that is none, over the largest of the motion."""
+
+
+def loose_motions(points: FloatArray, cells: Sequence[IntArray], held: FloatArray) -> FloatArray:
+    """Find the rigid motions of each body that supports do not prevent.
+
+    Parameters
+    ----------
+    points : (n, d) float64, length
+        d = 2 or 3.
+    cells : sequence of (m, n_nodes) int64
+        Elements; those that share nodes make a body.
+    held : (n, d, d) float64
+        Projectors on the directions in which the nodes are held.
+
+    Returns
+    -------
+    (q, n, d) float64
+        Displacements, zero outside of one body, the largest component 1.
+
+    Cost
+    ----
+    A search of connected components, one singular value decomposition of 3 or 6 columns for each body.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    n, dim = points.shape
+    ends = [np.stack([np.repeat(c[:, :1], c.shape[1] - 1, axis=1).ravel(), c[:, 1:].ravel()]) for c in cells]
+    rows, columns = np.concatenate(ends, axis=1) if ends else np.zeros((2, 0), np.int64)
+    links = sp.csr_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
+    _, body = connected_components(links, directed=False)
+    used = np.zeros(n, bool)
+    used[rows], used[columns] = True, True
+    found = [np.zeros((0, n, dim))]
+    for each in np.unique(body[used]):
+        mine = np.flatnonzero(body == each)
+        basis = _rigid(points[mine])
+        stopped = np.einsum("nij,qnj->niq", held[mine], basis).reshape(-1, len(basis))
+        _, size, right = np.linalg.svd(stopped, full_matrices=True)
+        size = np.append(size, np.zeros(len(basis) - len(size)))
+        motions = np.zeros((int((size <= NONE).sum()), n, dim))
+        motions[:, mine] = np.einsum("pq,qni->pni", right[size <= NONE], basis)
+        largest = np.abs(motions).max(axis=(1, 2), initial=np.finfo(float).tiny)
+        found.append(motions / largest[:, None, None])
+    return np.concatenate(found)
+
+
+def _rigid(X: FloatArray) -> FloatArray:
+    """Return translations and rotations about the middle, (3 or 6, n, d), the largest displacement of each about 1."""
+    dim = X.shape[1]
+    arm = X - X.mean(axis=0)
+    arm = arm / max(float(np.abs(arm).max(initial=0.0)), np.finfo(float).tiny)
+    found = [np.tile(row, (len(X), 1)) for row in np.eye(dim)]
+    for i in range(dim):
+        for j in range(i):
+            turn = np.zeros_like(X)
+            turn[:, i], turn[:, j] = -arm[:, j], arm[:, i]
+            found.append(turn)
+    return np.stack(found)
