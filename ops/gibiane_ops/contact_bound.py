@@ -107,16 +107,22 @@ def _bound_with_contact(
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
     doubts: list[str] = []
-    joint = _joint(ctx, states, given.law, pieces)
+    squares: list[list[FloatArray]] = []
     nodal = True
     for state in states:
-        found, squares = _tractions(ctx, state, given.law, pieces, sides, cl)
+        found, each = _tractions(ctx, state, given.law, pieces, sides, cl)
         nodal = nodal and found.nodal
+        squares.append(each)
         doubts += _doubts(ctx, state, given.law, found)
-        # The identity of Prager and Synge holds with twice the contact part.
-        totals = shared_out(ctx, state, blocks, squares, totals)
-        facets += facet_zones(ctx, state, squares, zones[0].mode)
+    joint, parts = _joint(ctx, states, given.law, pieces, squares)
     solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl, joint, nodal)
+    for (square, owner), change in zip(parts, np.split(solid.contact, _ends(parts)), strict=bool(len(solid.contact))):
+        np.add.at(square, owner, change)
+    for state, each in zip(states, squares, strict=True):
+        # The identity of Prager and Synge holds with twice the contact part.
+        each = [np.maximum(square, 0.0) for square in each]
+        totals = shared_out(ctx, state, blocks, each, totals)
+        facets += facet_zones(ctx, state, each, zones[0].mode)
     if solid.excess > VIOLATION:
         doubts.append(_unlawful(solid.excess))
     cutting = exact_pieces(ctx, pieces, outside)
@@ -200,41 +206,56 @@ def _motions(ctx: Context, state: SolvedContact, pieces: Pieces, supports: Rigid
     return motions[:, one] - np.where((master >= 0)[:, None], motions[:, two], 0.0)
 
 
-def _joint(ctx: Context, states: Sequence[SolvedContact], law: MChaml, pieces: Pieces) -> Joint | None:
+Parts = list[tuple[FloatArray, IntArray]]
+
+
+def _ends(parts: Parts) -> IntArray:
+    """Return where each part but the last ends, laid end to end."""
+    return np.cumsum([len(owner) for _, owner in parts])[:-1]
+
+
+def _joint(
+    ctx: Context, states: Sequence[SolvedContact], law: MChaml, pieces: Pieces, squares: list[list[FloatArray]]
+) -> tuple[Joint | None, Parts]:
     """Find the facets that are closed at all their nodes, without a gap in the mesh: their tractions may be improved.
 
-    Their pressures, and their tangential tractions too where they stick at all their nodes; nothing where friction ties
-    the bounds of the tractions to the pressures.
+    Pressures, and with Tresca's law friction too; nothing where friction ties the bounds of the tractions to the
+    pressures. Also tells which contact error of `squares`, and which of its facets, each facet of the joint is part of.
     """
     dim = pieces.zones[0].dim
     points = node_store(ctx).coords[pieces.nodes][:, :dim]
-    name, facets, bounds = np.arange(len(pieces.nodes)), [np.zeros((0, dim), np.int64)], [np.zeros((0, dim))]
-    for state in states:
+    name, parts = np.arange(len(pieces.nodes)), Parts()
+    facets, bounds, slips = [np.zeros((0, dim), np.int64)], [np.zeros((0, dim))], [np.zeros((0, dim, dim))]
+    for state, own in zip(states, squares, strict=True):
         if state.zone.law not in ("UNILATERAL", "TRESCA"):
             continue
         slave, master = state.pairs.pairs.T
         there = np.flatnonzero(master >= 0)
         one, two = (np.searchsorted(pieces.nodes, side[there]) for side in (slave, master))
-        motion = state.relative[there] - np.eye(dim)[0] * state.gap[there, None]
-        still = np.abs(motion) <= CLOSED * np.abs(state.relative).max()
+        open_by = np.abs(state.relative[there, 0] - state.gap[there])
         size = float(np.ptp(points, axis=0).max())
-        shut = still[:, 0] & (state.force[there, 0] < 0)
+        shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[there, 0] < 0)
         shut &= np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size
         name[one[shut]] = two[shut]
         closed, bound = np.zeros(len(pieces.nodes), bool), np.full(len(pieces.nodes), np.inf)
+        slip = np.zeros((len(pieces.nodes), dim))
         closed[one[shut]] = True
-        if state.zone.law == "TRESCA":
-            stuck = still.all(axis=1)
-            threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave[there[stuck]])
-            bound[one[stuck]] = threshold
-        for block in state.zone.slave.blocks:
+        threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave[there])
+        if state.zone.law == "TRESCA" and threshold is not None:
+            bound[one] = threshold
+            slip[one] = np.einsum("nij,ni->nj", state.frames[there, 1:], state.relative[there, 1:])
+        for block, square in zip(state.zone.slave.blocks, own, strict=True):
             places, owner = pieces.facets(block.cells)
             cells = np.searchsorted(pieces.nodes, np.take_along_axis(block.cells[owner], places, axis=1))
-            cells = cells[closed[cells].all(axis=1)]
+            kept = closed[cells].all(axis=1)
+            cells = cells[kept]
             facets.append(name[cells])
-            bounds.append(np.where(np.isfinite(bound[cells]).all(axis=1)[:, None], bound[cells], np.inf))
-    found = np.concatenate(facets)
-    return Joint(name, found, np.concatenate(bounds)) if len(found) else None
+            bounds.append(bound[cells])
+            slips.append(slip[cells])
+            parts.append((square, owner[kept]))
+    error = float(sum(square.sum() for own in squares for square in own))
+    joint = Joint(name, np.concatenate(facets), np.concatenate(bounds), np.concatenate(slips), error)
+    return (joint if len(joint.closed) or error else None), parts
 
 
 def _unlawful(violation: float) -> str:

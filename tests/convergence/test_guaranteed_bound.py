@@ -121,17 +121,17 @@ class Scene:
             self.points, self.cells, start, LAW, loads, sweeps=sweeps, mesh=self.mesh, joint=joint, aim=aim
         )
 
-    def joint(self, state, threshold=None):
-        """Facets that are closed at their three nodes; with a threshold, of Tresca, those that stick too."""
+    def joint(self, state, threshold=None, error=0.0):
+        """Facets that are closed at their three nodes; with a threshold, of Tresca, their slips."""
         slave, master = self.pairs.pairs[np.abs(state.w[:, 0]) < 1e-12].T
-        stuck = self.pairs.pairs[(np.abs(state.w) < 1e-12).all(axis=1), 0]
         name = np.arange(len(self.points))
         name[slave] = master
         closed = self.slave[np.isin(self.slave, slave).all(axis=1)]
-        bound = None
-        if threshold is not None:
-            bound = np.where(np.isin(closed, stuck).all(axis=1)[:, None], threshold, np.full(closed.shape, np.inf))
-        return Joint(name, name[closed], bound)
+        if threshold is None:
+            return Joint(name, name[closed])
+        slip = np.zeros(self.points.shape)
+        slip[self.pairs.pairs[:, 0]] = np.einsum("nij,ni->nj", self.interface.frames[:, 1:], state.w[:, 1:])
+        return Joint(name, name[closed], np.full(closed.shape, threshold), slip[closed], error)
 
     def with_contact(self, found):
         """Tractions of the boundary, those of contact included, opposite on the two bodies."""
@@ -148,9 +148,10 @@ class Scene:
         n, held = len(self.pairs.pairs), np.zeros((len(self.points), 3, 3))
         held[:, range(3), range(3)] = self.is_held
         motions = loose_motions(self.points, [self.cells], held)
+        modes = motions[:, self.pairs.pairs[:, 0]] - motions[:, self.pairs.pairs[:, 1]]
         return contact_tractions(
             self.points, self.slave, self.pairs.pairs[:, 0], self.interface.frames, state.r, state.w, self.pairs.gap,
-            np.full(n, mu), np.full(n, threshold), modes=motions[:, self.pairs.pairs[:, 0]] - motions[:, self.pairs.pairs[:, 1]],
+            np.full(n, mu), np.full(n, threshold), modes=modes,
         )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,12 +37,14 @@ class Admissible:
     sum_energy : (m,) float64, energy
         ``int (sigma_hat + sigma_h) : D^-1 : (sigma_hat + sigma_h)`` of each cell.
     history : list of float
-        Estimate after the balance of tractions and after each sweep.
+        Estimate after the balance of tractions and after each sweep, contact included.
     residual : float
         Largest violation of equilibrium found in the stress, relative, see `equilibrium_residual`.
     excess : float
         Largest violation of the law of contact on the facets of a joint, over the largest traction there; not positive
         within the law.
+    contact : (k,) float64, energy
+        What the improved tractions change in the squared contact error, by facet of the joint.
     """
 
     mesh: Simplices
@@ -53,6 +55,7 @@ class Admissible:
     history: list[float]
     residual: float
     excess: float = 0.0
+    contact: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def total(self) -> float:
@@ -158,7 +161,8 @@ def admissible_stress(
             found -= 2 * sign * (pull * jumps(mesh, tau, sign * sigma).reshape(len(pull), -1)).sum(axis=1)
         return np.maximum(found + constant, 0.0)
 
-    history, excess = [float(np.sqrt(distance(1.0).sum()))], 0.0
+    given = 0.0 if joint is None else joint.error
+    history, excess, contact = [float(np.sqrt(distance(1.0).sum() + given))], 0.0, np.zeros(0)
     if sweeps:
         free = np.broadcast_to(np.eye(dim), (len(mesh.nodes), dim, dim)).copy()
         free[mesh.boundary] = exterior.free
@@ -166,8 +170,9 @@ def admissible_stress(
         on, together, limits, turned_pull = mesh, tau, None, pull
         if joined is not None:
             on, together, free = joined.mesh, joined.taken(tau), joined.free(free)
-            limits = joined.limits(together)
+            limits = joined.limits(together).spending(history[0] ** 2)
             turned_pull = None if pull is None else joined.turned(pull)
+        work = None if limits is None else limits.work(together)
         improver = Improver(on, sigma, compliance, free, turned_pull, limits) if dim == 3 else None
         for _ in range(sweeps if dim == 3 else 1):
             if improver is None:
@@ -175,12 +180,15 @@ def admissible_stress(
             else:
                 improver.sweep(together)
             tau = together if joined is None else joined.given_back(together)
-            history.append(float(np.sqrt(distance(1.0).sum())))
+            if joined is not None and joint is not None and limits is not None and work is not None:
+                changed = 2 * (limits.work(together) - work)[joined.sides]
+                contact = np.bincount(joined.facet, changed, len(joint.closed))
+            history.append(float(np.sqrt(max(distance(1.0).sum() + given + contact.sum(), 0.0))))
         if joined is not None and limits is not None:
             exterior, excess = _with_contact(joined, exterior, tau), limits.excess(together)
     energy = mesh.volume * np.einsum("ms,mst,mt->m", sigma, compliance, sigma) + constant
     residual = equilibrium_residual(mesh, tau, exterior)
-    return Admissible(mesh, tau, distance(1.0), energy, distance(-1.0), history, residual, excess)
+    return Admissible(mesh, tau, distance(1.0), energy, distance(-1.0), history, residual, excess, contact)
 
 
 def _with_contact(joined: Joined, exterior: Exterior, tau: FloatArray) -> Exterior:

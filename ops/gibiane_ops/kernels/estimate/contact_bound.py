@@ -180,13 +180,15 @@ def contact_tractions(
         c, excess, scale = _within(body.nearest(c), body.nearest, turned, bound_mu, bound_fixed)
         lost = body.left(c)
     traction = c.reshape(m, d, d)
-    in_axes = np.einsum("maij,maj->mai", rows, traction)
-    motion = np.vstack([relative, np.zeros((1, d))])[local].copy()
-    motion[..., 0] = np.minimum(motion[..., 0] - np.append(gap, 0.0)[local], 0.0)
-    allowed = bound_mu.reshape(m, d) * np.maximum(-in_axes[..., 0], 0.0) + bound_fixed.reshape(m, d)
+    pressure = np.maximum(-np.einsum("mai,mai->ma", rows[:, :, 0], traction), 0.0)
+    allowed = bound_mu.reshape(m, d) * pressure + bound_fixed.reshape(m, d)
+    # Tangents turn from node to node: everything is interpolated in global axes.
+    along = np.einsum("nij,ni->nj", frames[:, 1:], relative[:, 1:])
+    motion = along + frames[:, 0] * np.minimum(relative[:, 0] - gap, 0.0)[:, None]
+    along, motion = (np.vstack([each, np.zeros((1, d))])[local] for each in (along, motion))
     at, weight = _divided(d)
-    slip = norms(np.einsum("pb,mbi->mpi", at, motion[..., 1:]).reshape(-1, d - 1)).reshape(m, -1)
-    work = np.einsum("mab,mai,mbi->m", mass, in_axes, motion) + area * np.einsum("ap,ma,mp->m", weight, allowed, slip)
+    slip = norms(np.einsum("pb,mbi->mpi", at, along).reshape(-1, d)).reshape(m, -1)
+    work = np.einsum("mab,mai,mbi->m", mass, traction, motion) + area * np.einsum("ap,ma,mp->m", weight, allowed, slip)
     normal = geometry.facet_normals(shape("SEG2" if d == 2 else "TRI3"), points[facets])
     cosine = np.abs(np.einsum("mai,mi->ma", rows[:, :, 0], normal))[local < len(nodes)]
     flatness = float(np.sqrt(np.maximum(1 - cosine.min(initial=1.0) ** 2, 0.0)))

@@ -7,32 +7,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.estimate.limits import MARGIN, Limits
+from gibiane_ops.kernels.estimate.limits import KEPT, Limits
+from gibiane_ops.kernels.estimate.macro import moments
 from gibiane_ops.kernels.estimate.simplices import Simplices, others, simplices, slots
 
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Facets in contact, closed at all their nodes, whose pressures may change: those without friction, or Tresca's.
+    """Facets in contact, closed at all their nodes, whose pressures may change, and friction of Tresca's law.
 
     Attributes
     ----------
     name : (n,) int64
-        For each node the one that stands for it: nodes of a closed pair share it.
+        For each node the one that stands for it: nodes of a closed pair share it, that of the master.
     closed : (k, d) int64
         Closed facets by the names of their nodes.
     bound : (k, d) float64, force / length^(d - 1), optional
-        Tresca's bound at these nodes where the facet sticks at all of them, so that its tangential tractions may change
-        too; infinite where they may not, as without it.
-
-    Notes
-    -----
-    ``R . (w_h - G n)`` vanishes on such facets whatever R, so that the contact error does not change.
+        Tresca's bound at these nodes; infinite where only pressures may change, as without it.
+    slip : (k, d, d) float64, length, optional
+        Tangential displacement of slave over master at these nodes, global axes; none without it.
+    error : float, energy
+        Squared contact error (twice the integral) of all the contact, with the tractions at the beginning.
     """
 
     name: IntArray
     closed: IntArray
     bound: FloatArray | None = None
+    slip: FloatArray | None = None
+    error: float = 0.0
 
 
 class Joined:
@@ -52,8 +54,12 @@ class Joined:
         Its sides in contact, whose pressures are free.
     normal : (n_sides, d) float64
         Unit normals there, leaving the first cell; zero elsewhere.
+    facet : (k,) int64
+        Facet of the joint of each.
     bound : (n_sides, d) float64, force
-        Largest tangential tractions at the corners of those that stick; infinite elsewhere.
+        Largest tangential tractions at the corners; infinite where they may not change.
+    slide : (n_sides, d, d) float64, length
+        See `limits.Limits`.
     """
 
     def __init__(self, mesh: Simplices, joint: Joint) -> None:
@@ -72,14 +78,22 @@ class Joined:
         wanted = {tuple(row): i for i, row in enumerate(np.take_along_axis(joint.closed, order, axis=1).tolist())}
         self.crossed = np.flatnonzero(inner & was_boundary)
         found = np.array([wanted.get(tuple(row), -1) for row in self.mesh.nodes[self.crossed].tolist()], np.int64)
-        self.sides, rows = self.crossed[found >= 0], found[found >= 0]
+        self.sides, self.facet = self.crossed[found >= 0], found[found >= 0]
         self.normal = np.zeros((len(self.mesh.nodes), dim))
         out = self.mesh.outward[self.mesh.cell[self.sides, 0], self.mesh.local[self.sides, 0]]
         area = np.linalg.norm(out, axis=1)
         self.normal[self.sides] = out / area[:, None]
         self.bound = np.full((len(self.mesh.nodes), dim), np.inf)
         if joint.bound is not None:
-            self.bound[self.sides] = np.take_along_axis(joint.bound, order, axis=1)[rows] * area[:, None]
+            self.bound[self.sides] = np.take_along_axis(joint.bound, order, axis=1)[self.facet] * area[:, None]
+        self.slide = np.zeros((len(self.mesh.nodes), dim, dim))
+        if joint.slip is not None:
+            slip = np.take_along_axis(joint.slip, order[:, :, None], axis=1)[self.facet]
+            side, _ = self._old(self.mesh.cell[self.sides, 0], self.mesh.local[self.sides, 0])
+            old = mesh.nodes[side]
+            # nodes of the slave bear another name
+            sign = np.where((joint.name[old] != old).any(axis=1), 1.0, -1.0)
+            self.slide[self.sides] = np.einsum("s,ab,sbi->sai", sign, moments(dim), slip)
 
     def _old(self, cell: IntArray, local: IntArray) -> tuple[IntArray, IntArray]:
         """Return the side of the separate mesh, and the places of its corners, for sides of cells of the joined one."""
@@ -139,4 +153,4 @@ class Joined:
         area[self.sides] = np.linalg.norm(self.mesh.outward[cell, local], axis=1)
         pull = np.einsum("kai,ki->", tau[self.sides], self.normal[self.sides]) / self.mesh.dim
         mean = max(-float(pull), 0.0) / max(float(area.sum()), np.finfo(float).tiny)
-        return Limits(self.normal, MARGIN * mean * area, self.bound)
+        return Limits(self.normal, KEPT * mean * area, self.bound, self.slide)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,9 @@ from gibiane_ops.kernels.estimate.limits import Limits
 from gibiane_ops.kernels.estimate.macro import contraction, macro_element, moments, turned
 from gibiane_ops.kernels.estimate.simplices import Simplices, colours, others, slots
 
-PENALTY = 1e5
-"""Weight of the balance of each cell over the energy, in the augmented Lagrangian of a star."""
+PENALTY, PENALTY_PRESSED = 1e5, 1e8
+"""Weight of the balance of each cell over the energy, in the augmented Lagrangian of a star; that of a star in contact,
+whose energy is stiffer where tractions are pushed back to the law."""
 
 STOP = 1e3
 """Stiffness against what leaves the law on contact facets, over that of a traction."""
@@ -21,8 +23,11 @@ STOP = 1e3
 UZAWA = 3
 """Solutions with one factor: the balance is met to round-off after the third."""
 
-UZAWA_PRESSED = 8
-"""The same where tractions are pushed back to the law, which makes the energy stiffer."""
+UZAWA_PRESSED, LEFT = 20, 1e-15
+"""The most where tractions are pushed back to the law, and the imbalance that is none."""
+
+ROUNDS = 5
+"""Solutions of a star until none of its tractions leaves the law; what the last one leaves cuts the step."""
 
 CHUNK = 64
 """Stars that are assembled together."""
@@ -110,6 +115,52 @@ def balance_rows(mesh: Simplices, cells: IntArray) -> FloatArray:
     return B.reshape(len(cells), dim + len(turns), -1)
 
 
+@dataclass(eq=False)
+class _Springs:
+    """Corners of stars that are pushed back to the law.
+
+    Attributes
+    ----------
+    row, corner, kind : (m,) int64
+        Place among the sides of the stars; 0 for a pull, 1 for a slide.
+    star, place : (m,) int64
+        Place in the systems.
+    direction : (m, d) float64
+    over : (m,) float64, force
+        How far beyond the law the traction is in this direction, before any change.
+    stiff : float
+    force : (m,) float64
+        Multipliers: what pushes, beside the springs.
+    blocks : (m, d, d) float64
+        What they add to the matrix.
+    pull : (m, d) float64
+        What they add to the right-hand side, beside their push.
+    """
+
+    row: IntArray
+    corner: IntArray
+    kind: IntArray
+    star: IntArray
+    place: IntArray
+    direction: FloatArray
+    over: FloatArray
+    stiff: float
+    force: FloatArray
+    blocks: FloatArray
+    pull: FloatArray
+
+    def pushed(self, right: FloatArray, dim: int) -> FloatArray:
+        """Return right-hand sides with the push of the springs."""
+        found = right.copy()
+        push = (self.force + self.stiff * self.over)[:, None] * self.direction
+        np.subtract.at(found.reshape(len(right), -1, dim), (self.star, self.place), push)
+        return found
+
+    def tighten(self, x: FloatArray) -> None:
+        """Raise the multipliers by what the springs still give way."""
+        self.force += self.stiff * (self.over + np.einsum("si,si->s", self.direction, x[self.star, self.place]))
+
+
 class Improver:
     """What every sweep needs: the colours, and the place of each side in the systems of its stars.
 
@@ -163,6 +214,14 @@ class Improver:
             self.colours.append(used[np.argsort(self.n_sides[used], kind="stable")])
         self.n_used = sum(len(stars) for stars in self.colours)
         self.gain: FloatArray | None = None
+        self.ahead = np.zeros((0, dim, dim)) if limits is None else np.zeros((len(mesh.nodes), dim, dim))
+        self.pushed = np.zeros((len(self.ahead), 2, dim))
+        self.touching: NDArray[np.bool_] | None = None
+        if limits is not None:
+            here = np.flatnonzero(np.abs(limits.normal).max(axis=1) > 0)
+            ends = mesh.star[mesh.cell[here, 0][:, None], others(dim)[mesh.local[here, 0]]]
+            self.touching = np.zeros(mesh.n_stars, bool)
+            self.touching[ends] = True
 
     def sweep(self, tau: FloatArray) -> None:
         """Improve the tractions in place, `VISITS` times around each node on average.
@@ -213,7 +272,7 @@ class Improver:
             for start in range(0, len(some), CHUNK):
                 self._improve(some[start : start + CHUNK], tau, factor)
 
-    def _improve(self, stars: IntArray, tau: FloatArray, factor: float) -> None:
+    def _improve(self, stars: IntArray, tau: FloatArray, factor: float, turn: int = 0) -> None:
         mesh, dim = self.mesh, self.mesh.dim
         block = dim * dim
         row, mine = _ranges(self.first_corner[stars], self.n_corners[stars])
@@ -238,7 +297,8 @@ class Improver:
         if len(partial):
             self._project(mesh.side[cells[:, None], sides][partial], partial, H, B, descent)
         stiff = STOP * float(np.einsum("kaaii->", H)) / (k * dim * block)
-        weight = PENALTY * np.einsum("kaaii->k", H) / (B**2).sum(axis=(1, 2, 3))
+        penalty = PENALTY if self.touching is None else np.where(self.touching[stars][row], PENALTY_PRESSED, PENALTY)
+        weight = penalty * np.einsum("kaaii->k", H) / (B**2).sum(axis=(1, 2, 3))
         H += weight[:, None, None, None, None] * np.matmul(B[:, :, None], B[:, None].swapaxes(3, 4))
 
         size = int(self.n_sides[stars].max())
@@ -269,47 +329,99 @@ class Improver:
             return total.reshape(len(stars), -1)
 
         start = gathered(descent)
-        turns, step = UZAWA, np.full(len(stars), factor)
+        spring = None
         if self.limits is not None:
-            pressed = self._press(tau, moved, here, at, stiff, A, start.reshape(len(stars), size, dim, dim))
-            step[pressed] = 1.0
-            turns = UZAWA_PRESSED if len(pressed) else UZAWA
-        right, push = start, np.zeros((k, B.shape[3]))
+            start.reshape(len(stars), size, block)[here, at] -= self.limits.slide[moved].reshape(-1, block)
+            spring = self._springs(tau, moved, here, at, stiff, turn)
+            s, p = spring.star, spring.place
+            np.add.at(A.reshape(len(A), size * dim, dim, size * dim, dim), (s, p, slice(None), p), spring.blocks)
+            np.add.at(start.reshape(len(A), size * dim, dim), (s, p), spring.pull)
+        push = np.zeros((k, B.shape[3]))
+        right = start if spring is None else spring.pushed(start, dim)
         solve = _factored(A.reshape(len(stars), size * block, -1))
-        for turn in range(turns):
+        turns = UZAWA_PRESSED if spring is not None and len(spring.row) else UZAWA
+        for each_turn in range(turns):
             x = solve(right).reshape(len(stars), size, block)
-            if turn < turns - 1:
-                local = np.where(known[..., None], x[row[:, None], place], 0.0)
-                push += weight[:, None] * np.einsum("kair,kai->kr", B, local)
-                right = start - gathered(np.einsum("kair,kr->kai", B, push))
-        change = step[here, None, None] * x[here, at].reshape(-1, dim, dim)
-        if self.limits is not None:
-            least = np.ones(len(stars))
-            np.minimum.at(least, here, self.limits.step(tau[moved], change, moved))
-            change *= least[here, None, None]
-        tau[moved] += change
+            if each_turn == turns - 1:
+                break
+            local = np.where(known[..., None], x[row[:, None], place], 0.0)
+            gap = np.einsum("kair,kai->kr", B, local)
+            if turns > UZAWA and np.abs(gap).max() <= LEFT * np.abs(tau[moved]).max():
+                break
+            push += weight[:, None] * gap
+            right = start - gathered(np.einsum("kair,kr->kai", B, push))
+            if spring is not None:
+                spring.tighten(x.reshape(len(stars), size * dim, dim))
+                right = spring.pushed(right, dim)
+        change = x[here, at].reshape(-1, dim, dim)
+        if spring is None:
+            tau[moved] += factor * change
+        else:
+            self._within(stars, tau, moved, here, change, spring, factor, turn)
         if self.gain is not None:
             self.gain[stars] = np.maximum((x.reshape(start.shape) * start).sum(axis=1), 0.0)
 
-    def _press(
+    def _within(
         self,
+        stars: IntArray,
         tau: FloatArray,
         moved: IntArray,
         star: IntArray,
-        place: IntArray,
-        stiff: float,
-        A: FloatArray,
-        start: FloatArray,
-    ) -> IntArray:
-        """Push the corners that are past the law, or nearly, back inside; return the stars where there are any."""
+        change: FloatArray,
+        spring: _Springs,
+        factor: float,
+        turn: int,
+    ) -> None:
+        """Change the tractions as far as the law lets them; stars that it stops are solved again, pushed back."""
+        assert self.limits is not None
+        full = np.full(len(stars), factor)
+        full[spring.star] = 1.0
+        least = np.ones(len(stars))
+        np.minimum.at(least, star, self.limits.step(tau[moved], full[star, None, None] * change, moved))
+        again = least < 1.0
+        again[spring.star[spring.force < 0]] = True
+        if turn == ROUNDS - 1:
+            again[:] = False
+        step = np.where(again, 0.0, full * least)
+        if again.any():
+            rows = again[star]
+            sides = moved[rows]
+            self.ahead[sides] = tau[sides] + change[rows]
+            force = np.zeros((len(moved), 2, tau.shape[1]))
+            force[spring.row, spring.kind, spring.corner] = spring.force
+            self.pushed[sides] = force[rows]
+        tau[moved] += step[star, None, None] * change
+        if again.any():
+            gain, self.gain = self.gain, None
+            self._improve(stars[again], tau, 1.0, turn + 1)
+            self.gain = gain
+
+    def _springs(
+        self, tau: FloatArray, moved: IntArray, star: IntArray, place: IntArray, stiff: float, turn: int
+    ) -> _Springs:
+        """Put a spring on each corner that is at its limit, would leave the law, or that the last ones pushed back.
+
+        Where friction is at its bound g the multiplier p of ``|R_t| <= g`` also resists turning, with p / g.
+        """
         assert self.limits is not None
         dim = self.mesh.dim
-        row, corner, n, over = self.limits.passed(tau[moved], moved)
-        s, p = star[row], place[row]
-        blocks = A.reshape(len(A), start.shape[1], dim, dim, start.shape[1], dim, dim)
-        np.add.at(blocks, (s, p, corner, slice(None), p, corner), stiff * n[:, :, None] * n[:, None, :])
-        np.subtract.at(start, (s, p, corner), stiff * over[:, None] * n)
-        return np.unique(s)
+        seen = self.ahead[moved] if turn else tau[moved]
+        known = self.pushed[moved] if turn else np.zeros((len(moved), 2, dim))
+        row, corner, kind, n, over = self.limits.passed(seen, moved, known > 0)
+        normal = self.limits.normal[moved[row]]
+        ahead = (seen - tau[moved])[row, corner]
+        force = known[row, kind, corner]
+        guess = np.maximum(-np.einsum("si,si->s", n, self.limits.slide[moved][row, corner]), 0.0)
+        force = np.where(force > 0, force, np.where(kind == 1, guess, 0.0))
+        size = np.einsum("si,si->s", n, seen[row, corner])
+        bend = np.where(kind == 1, force / np.maximum(size, np.finfo(float).tiny), 0.0)
+        across = np.eye(dim) - n[:, :, None] * n[:, None, :] - normal[:, :, None] * normal[:, None, :]
+        turning = bend[:, None, None] * across
+        blocks = stiff * n[:, :, None] * n[:, None, :] + turning
+        pull = np.einsum("sij,sj->si", turning, ahead)
+        over = over - np.einsum("si,si->s", n, ahead)
+        spot = place[row] * dim + corner
+        return _Springs(row, corner, kind, star[row], spot, n, over, stiff, force, blocks, pull)
 
     def _project(self, sides: IntArray, partial: IntArray, H: FloatArray, B: FloatArray, descent: FloatArray) -> None:
         """Keep the directions that are free on sides where only some are."""

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.estimate.limits import Limits
 from gibiane_ops.kernels.estimate.simplices import Simplices
-from gibiane_ops.kernels.estimate.stars import STOP, balance_rows, energy_matrices, jumps
+from gibiane_ops.kernels.estimate.stars import balance_rows, energy_matrices, jumps
 from gibiane_ops.kernels.solve import factorize
 
 PENALTY = 1e8
@@ -16,6 +16,9 @@ PENALTY = 1e8
 
 UZAWA = 6
 """Largest number of solutions with the factor."""
+
+STOP = 1e6
+"""Stiffness against what leaves the law on contact facets, over that of a traction."""
 
 SETS = 12
 """Largest number of sets of corners that are pushed back to the law of contact."""
@@ -86,7 +89,10 @@ def improve_whole(
     slope = np.einsum("mij,mj->mi", H, jumps(mesh, tau, stress).reshape(m, n_t))
     if pull is not None:
         slope -= pull
-    descent = P @ np.bincount(where.ravel(), (-sign * slope).ravel(), minlength=size)
+    descent = np.bincount(where.ravel(), (-sign * slope).ravel(), minlength=size)
+    if limits is not None:
+        descent -= limits.slide.ravel()
+    descent = P @ descent
 
     H *= sign[:, :, None] * sign[:, None]
     B *= sign[:, None]
@@ -101,12 +107,12 @@ def improve_whole(
 
     x = _solved(A, P, descent, balance, weight, tau)
     if limits is not None:
-        sides, known = np.arange(len(tau)), np.zeros((2, 0), np.int64)
+        sides, known = np.arange(len(tau)), np.zeros((3, 0), np.int64)
         for _ in range(SETS):
-            row, corner, n, over = limits.passed(tau + x.reshape(tau.shape), sides)
-            if np.array_equal(known, (row, corner)):
+            row, corner, kind, n, over = limits.passed(tau + x.reshape(tau.shape), sides)
+            if np.array_equal(known, (row, corner, kind)):
                 break
-            known = np.stack([row, corner])
+            known = np.stack([row, corner, kind])
             place = (row * dim + corner)[:, None] * dim + np.arange(dim)
             start = np.arange(len(row) + 1) * dim
             N = sp.csr_array((n.ravel(), place.ravel(), start), shape=(len(row), size)) @ P
