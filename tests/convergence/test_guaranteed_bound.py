@@ -6,6 +6,7 @@ bricks extrapolated, down to 3 and 6 mm (known to 0.07 and 0.0002 %).
 """
 
 import io
+from dataclasses import replace
 from functools import lru_cache
 from itertools import permutations
 
@@ -22,10 +23,11 @@ from gibiane_ops.kernels.contact.newton import solve_coulomb
 from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.elasticity import element_stiffness, strains, stresses
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stress
+from gibiane_ops.kernels.errors import NotConverged
+from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stress, equilibrium_residual
 from gibiane_ops.kernels.estimate.bodies import loose_motions
 from gibiane_ops.kernels.estimate.contact_bound import contact_tractions
-from gibiane_ops.kernels.estimate.joints import Joint
+from gibiane_ops.kernels.estimate.joints import Joined, Joint
 from gibiane_ops.kernels.estimate.pieces import balanced_stress, uniform_aim
 from gibiane_ops.kernels.estimate.simplices import simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
@@ -179,8 +181,8 @@ def test_bonded_blocks(side, h):
     assert found.residual < 1e-10
     start, once, twice = effectivity(of, found, BONDED[side])
     assert 1 <= twice < once < start
-    # The edge of the small punch is singular, and its load travels far: measured 1.28 and 1.22 at 12.5 mm. At 8.33 mm
-    # two sweeps leave 1.257 (theta is known to 2 %): from star to star loads travel less far on finer meshes.
+    # The edge of the small punch is singular, and its load travels far: measured 1.24 and 1.19 at 12.5 mm, 1.27 and
+    # 1.22 at 8.33 mm (theta is known to 2 %): from star to star loads travel less far on finer meshes.
     assert once <= 1.5
     assert twice <= 1.25
     assert 4 * found.energy.sum() < BONDED[side] < 4 * (found.energy.sum() + found.total**2)
@@ -194,10 +196,11 @@ def test_blocks_without_friction(h):
     assert pressures.facet.sum() < 1e-12
     # One brick under a quarter of the punch: the force of its outer corners is too large for two triangles. Pressures
     # that balance the bodies rather than each node push everywhere.
-    assert pressures.admissible == (h < 20)
-    found = of.estimate(u, of.with_contact(pressures), joint=of.joint(state))
+    assert pressures.admissible
+    assert pressures.nodal == (h < 20)
+    found = of.estimate(u, of.with_contact(pressures), joint=of.joint(state), nodal=pressures.nodal)
     assert found.residual < 1e-10
-    assert found.tension < 0
+    assert found.excess < 0
     _, once, twice = effectivity(of, found, FRICTIONLESS)
     assert 1 <= twice < once <= 1.5
     assert twice <= 1.25
@@ -236,30 +239,83 @@ BAS = MINI (TC.'ETAT') ; HAUT = MAXI (TC.'ETAT') ;
         (5e-4, (1, 2), 1.2),
         pytest.param(1e-4, (1, 2), 1.2, marks=pytest.mark.slow),
         pytest.param(2e-3, (1, 2), 1.2, marks=pytest.mark.slow),
-        # tractions that stick are not improved, only pressures are
-        pytest.param(1.0, (1, 1), 1.5, marks=pytest.mark.slow),
+        pytest.param(1.0, (1, 1), 1.2, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_threshold_of_tresca(threshold, states, most):
     # Sliding here and there, nearly everywhere, nearly nowhere, and nowhere.
+    assert_bounded(TRESCA, threshold, states, most)
+
+
+def assert_bounded(script, threshold, states, most):
     out = io.StringIO()
     session = Session(out=out, err=out)
     session.globals.names["SEUIL"] = threshold
-    assert session.run_text(TRESCA) == 0, out.getvalue()
+    assert session.run_text(script) == 0, out.getvalue()
     found = session.names()
-    assert found["SURE"]
+    assert found["SURE"], out.getvalue()
     assert (found["BAS"], found["HAUT"]) == states
     # Both meshes have about one theta: |u - u_h|^2 = |u_f - u_h|^2 + |u - u_f|^2, theta^2 = (EC^2 - EF^2) / EN.
     assert 1 <= np.sqrt((found["EC"] ** 2 - found["EF"] ** 2) / found["EN"]) <= most
 
 
-def test_slips_of_several_directions_leave_no_admissible_traction():
+def test_slips_of_several_directions():
     # Nodes that slip all carry the bound times their area; their directions differ, so that no traction within the
-    # bound has these nodal forces. It is told, not claimed.
-    of = scene(100.0, 25.0, False)
+    # bound has these nodal forces. Tractions that balance the bodies are within the law, and go on to be.
+    of, g = scene(100.0, 50.0, False), 0.2
     area = of.pairs.area
-    _, state = of.contact(friction(len(area), cohesion=0.2 * area))
-    assert (np.linalg.norm(state.w[:, 1:], axis=1) > 1e-9).sum() > 4
-    found = of.tractions(state, threshold=0.2)
-    assert not found.admissible
-    assert found.violation < 0.05
+    u, state = of.contact(friction(len(area), cohesion=g * area))
+    assert (np.linalg.norm(state.w[:, 1:], axis=1) > 1e-9).sum() >= 3
+    found = of.tractions(state, threshold=g)
+    assert found.admissible
+    assert not found.nodal
+    joint = of.joint(state, g, 2 * found.facet.sum())
+    bound = of.estimate(u, of.with_contact(found), joint=joint, nodal=False)
+    assert bound.residual < 1e-10
+    assert bound.excess <= 1e-9
+    assert (np.diff(bound.history) < 0).all()
+    assert 2 * found.facet.sum() + bound.contact.sum() > 0
+    assert bound.total**2 + 2 * found.facet.sum() + bound.contact.sum() == pytest.approx(bound.history[-1] ** 2)
+    fixed = of.estimate(u, of.with_contact(found), nodal=False)
+    assert np.hypot(fixed.total, np.sqrt(2 * found.facet.sum())) > bound.history[-1]
+    # Tractions that differ on the two sides, or leave the bound, are seen.
+    with pytest.raises(NotConverged):
+        of.estimate(u, of.with_contact(replace(found, traction=1.01 * found.traction)), nodal=False)
+    joined = Joined(of.mesh, joint)
+    together = joined.taken(bound.tau)
+    assert joined.limits(together).excess(together) <= 1e-9
+    assert joined.limits(together).excess(1.01 * together) > 1e-6
+    one_side = of.traction.copy()
+    row = {tuple(nodes): i for i, nodes in enumerate(of.nodes)}
+    for nodes, values in zip(of.slave, found.traction, strict=True):
+        one_side[row[tuple(np.sort(nodes))]] += values[np.argsort(nodes)]
+    loads = Exterior(one_side, of.free, np.zeros((len(of.cells), 3)))
+    assert equilibrium_residual(of.mesh, fixed.tau, loads) > 1e-3
+
+
+SOLIDS = """
+OPTI DIME 3 ELEM CUB8 MODE TRID ; PZ = 0. 0. 0. ; PX = 1. 0. 0. ; PY = 0. 1. 0. ; PT = 0. 0. 1. ;
+DEBP BLOCS N*ENTIER ;
+  T = TABLE ; S1 = (DROI N PZ PX) TRAN N PY ; S2 = S1 PLUS PZ ;
+  T1 = CHAN TET4 (S1 VOLU N 'TRAN' PT) ; T2 = CHAN TET4 (S2 VOLU N 'TRAN' (PZ MOIN PT)) ; E1 = ENVE T1 ; E2 = ENVE T2 ;
+  F1 = E1 ELEM 'APPU' 'STRI' (T1 POIN 'PLAN' PZ PX PY 1.E-6) ;
+  F2 = E2 ELEM 'APPU' 'STRI' (T2 POIN 'PLAN' PZ PX PY 1.E-6) ;
+  HAUT = E1 ELEM 'APPU' 'STRI' (T1 POIN 'PLAN' (PZ PLUS PT) (PX PLUS PT) (PY PLUS PT) 1.E-6) ;
+  MO = (MODE T1 'MECANIQUE' 'ELASTIQUE') ET (MODE T2 'MECANIQUE' 'ELASTIQUE') ; TT = T1 ET T2 ;
+  MA = (MATE (REDU MO T1) 'YOUN' 1. 'NU' 0.3) ET (MATE (REDU MO T2) 'YOUN' 10. 'NU' 0.1) ;
+  CL = (BLOQ 'DEPL' (T2 POIN 'PLAN' (PZ MOIN PT) (PX MOIN PT) (PY MOIN PT) 1.E-6))
+    ET (BLOQ 'UX' (TT POIN 'PLAN' PZ PY PT 1.E-6)) ET (BLOQ 'UY' (TT POIN 'PLAN' PZ PX PT 1.E-6)) ;
+  MC = MODE F2 F1 'CONTACT' 'FROTTANT' 'TRESCA' ; MATC = MATE MC 'SEUI' SEUIL ; RC J = RIGI MC MATC ;
+  U = RESO ((RIGI MO MA) ET CL ET RC) ((PRES 'MASS' MO 1.E-2 HAUT) ET J) ; REA = REAC RC U ;
+  SIG = SIGM MO MA U ; T.'E' = ERREUR 'CONTACT' 'RDC' 'TABL' MO SIG MA MC MATC U REA CL 'PRES' 1.E-2 HAUT ;
+  T.'U' = U ; T.'MO' = MO ; T.'MA' = MA ; T.'T1' = T1 ; T.'T2' = T2 ; T.'ETAT' = EXCO 'ETAT' (COFR MC MATC U REA) ;
+FINP T ;
+TC = BLOCS 2 ; TF = BLOCS 4 ;
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("threshold", "states"), [(1e-4, (1, 2)), (5e-4, (1, 2)), (2e-3, (1, 2)), (1.0, (1, 1))])
+def test_threshold_of_tresca_in_space(threshold, states):
+    # A quarter of two cubes, the upper one soft: it spreads, and slips turn about the middle.
+    assert_bounded(SOLIDS + TRESCA[TRESCA.index("L = MOTS") :], threshold, states, 1.25)

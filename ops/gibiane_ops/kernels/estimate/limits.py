@@ -56,7 +56,7 @@ class Limits:
             Tractions at the corners of `sides`.
         sides : (k,) int64
         also : (k, 2, d) bool, optional
-            Corners to be found wherever they are, by kind.
+            Corners to be found wherever they are, by kind; then others only where they are past.
 
         Returns
         -------
@@ -73,11 +73,13 @@ class Limits:
         held = np.isfinite(bound)
         tight = pull + self.keep[sides, None]
         loose = np.where(held, slide - (1 - self.margin) * np.where(held, bound, 0.0), -1.0)
-        past = np.stack(
-            [(tight > 0) & contact, (loose > -0.5 * self.margin * np.where(held, bound, 0.0)) & held & contact], axis=1
-        )
-        if also is not None:
-            past |= also
+        room = np.where(held, bound, 0.0)
+        if also is None:
+            past = np.stack([tight > 0, held & (loose > -0.5 * self.margin * room)], axis=1)
+        else:
+            far = TOUCH * float(np.abs(tau).max(initial=0.0))
+            past = np.stack([tight > far, held & (loose > TOUCH * room)], axis=1) | also
+        past &= contact[:, None]
         row, kind, corner = np.nonzero(past)
         size = np.maximum(slide[row, corner], np.finfo(float).tiny)[:, None]
         direction = np.where((kind == 0)[:, None], normal[row], along[row, corner] / size)

@@ -334,7 +334,9 @@ class Improver:
             start.reshape(len(stars), size, block)[here, at] -= self.limits.slide[moved].reshape(-1, block)
             spring = self._springs(tau, moved, here, at, stiff, turn)
             s, p = spring.star, spring.place
-            np.add.at(A.reshape(len(A), size * dim, dim, size * dim, dim), (s, p, slice(None), p), spring.blocks)
+            at_rows = p[:, None] * dim + np.arange(dim)
+            matrix = A.reshape(len(A), size * block, -1)
+            np.add.at(matrix, (s[:, None, None], at_rows[:, :, None], at_rows[:, None, :]), spring.blocks)
             np.add.at(start.reshape(len(A), size * dim, dim), (s, p), spring.pull)
         push = np.zeros((k, B.shape[3]))
         right = start if spring is None else spring.pushed(start, dim)
@@ -407,7 +409,7 @@ class Improver:
         dim = self.mesh.dim
         seen = self.ahead[moved] if turn else tau[moved]
         known = self.pushed[moved] if turn else np.zeros((len(moved), 2, dim))
-        row, corner, kind, n, over = self.limits.passed(seen, moved, known > 0)
+        row, corner, kind, n, over = self.limits.passed(seen, moved, known > 0 if turn else None)
         normal = self.limits.normal[moved[row]]
         ahead = (seen - tau[moved])[row, corner]
         force = known[row, kind, corner]

@@ -89,7 +89,7 @@ def improve_whole(
     slope = np.einsum("mij,mj->mi", H, jumps(mesh, tau, stress).reshape(m, n_t))
     if pull is not None:
         slope -= pull
-    descent = np.bincount(where.ravel(), (-sign * slope).ravel(), minlength=size)
+    descent = np.asarray(np.bincount(where.ravel(), (-sign * slope).ravel(), minlength=size), np.float64)
     if limits is not None:
         descent -= limits.slide.ravel()
     descent = P @ descent
@@ -105,33 +105,49 @@ def improve_whole(
     held = sp.eye_array(size) - P
     A = sp.csr_array(P @ energy @ P + held * float(np.median(energy.diagonal())))
 
-    x = _solved(A, P, descent, balance, weight, tau)
+    x, _ = _solved(A, P, descent, balance, weight, np.zeros(len(weight)), tau)
     if limits is not None:
-        sides, known = np.arange(len(tau)), np.zeros((3, 0), np.int64)
+        sides, pushing = np.arange(len(tau)), np.zeros((len(tau), 2, dim), bool)
+        known = pushing.copy()
         for _ in range(SETS):
-            row, corner, kind, n, over = limits.passed(tau + x.reshape(tau.shape), sides)
-            if np.array_equal(known, (row, corner, kind)):
+            row, corner, kind, n, over = limits.passed(tau + x.reshape(tau.shape), sides, pushing)
+            active = np.zeros_like(known)
+            active[row, kind, corner] = True
+            if np.array_equal(known, active):
                 break
-            known = np.stack([row, corner, kind])
+            known = active
             place = (row * dim + corner)[:, None] * dim + np.arange(dim)
             start = np.arange(len(row) + 1) * dim
             N = sp.csr_array((n.ravel(), place.ravel(), start), shape=(len(row), size)) @ P
-            springs = sp.csr_array(A + stiff * (N.T @ N))
-            x = _solved(springs, P, descent - stiff * (N.T @ (over - N @ x)), balance, weight, tau)
+            springs, rows = np.full(len(row), stiff), sp.csr_array(sp.vstack([balance, N]))
+            offset = np.concatenate([np.zeros(len(weight)), over - N @ x])
+            x, push = _solved(
+                sp.csr_array(A + stiff * (N.T @ N)), P, descent, rows, np.concatenate([weight, springs]), offset, tau
+            )
+            pushing = np.zeros_like(known)
+            pushing[row, kind, corner] = push[len(weight) :] > 0
         x *= float(limits.step(tau, x.reshape(tau.shape), sides).min(initial=1.0))
     tau += x.reshape(tau.shape)
 
 
 def _solved(
-    A: sp.csr_array, P: sp.csr_array, descent: FloatArray, balance: sp.csr_array, weight: FloatArray, tau: FloatArray
-) -> FloatArray:
-    """Solve for the change of the tractions, the balance of the cells being met to round-off."""
+    A: sp.csr_array,
+    P: sp.csr_array,
+    descent: FloatArray,
+    rows: sp.csr_array,
+    weight: FloatArray,
+    offset: FloatArray,
+    tau: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Solve for the change x of the tractions with ``rows @ x + offset = 0`` to round-off; also the multipliers."""
     factor = factorize(A)
-    x, push, scale = np.zeros(len(descent)), np.zeros(len(weight)), float(np.abs(tau).max(initial=0.0))
+    x, push, scale = np.zeros(len(descent)), weight * offset, float(np.abs(tau).max(initial=0.0))
+    force = np.zeros(len(weight))
     for _ in range(UZAWA):
-        x = np.asarray(P @ factor.solve(descent - balance.T @ push), np.float64)
-        gap = balance @ x
+        x = np.asarray(P @ factor.solve(descent - rows.T @ push), np.float64)
+        gap = rows @ x + offset
+        force = push + weight * (gap - offset)
         if np.abs(gap).max(initial=0.0) <= LEFT * (scale + np.abs(x).max(initial=0.0)):
             break
         push += weight * gap
-    return x
+    return x, force
