@@ -284,7 +284,7 @@ def test_slips_of_several_directions():
     joined = Joined(of.mesh, joint)
     together = joined.taken(bound.tau)
     assert joined.limits(together).excess(together) <= 1e-9
-    assert joined.limits(together).excess(1.01 * together) > 1e-6
+    assert joined.limits(together).excess(1.03 * together) > 1e-6
     one_side = of.traction.copy()
     row = {tuple(nodes): i for i, nodes in enumerate(of.nodes)}
     for nodes, values in zip(of.slave, found.traction, strict=True):

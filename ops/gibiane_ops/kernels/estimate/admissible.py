@@ -170,7 +170,8 @@ def admissible_stress(
         on, together, limits, turned_pull = mesh, tau, None, pull
         if joined is not None:
             on, together, free = joined.mesh, joined.taken(tau), joined.free(free)
-            limits = joined.limits(together).spending(history[0] ** 2)
+            limits = joined.limits(together)
+            limits = limits.spending(history[0] ** 2) if dim == 3 else limits
             turned_pull = None if pull is None else joined.turned(pull)
         work = None if limits is None else limits.work(together)
         improver = Improver(on, sigma, compliance, free, turned_pull, limits) if dim == 3 else None
