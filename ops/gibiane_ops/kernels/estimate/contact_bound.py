@@ -172,7 +172,8 @@ def contact_tractions(
     nodal = excess <= VIOLATION * scale and lost <= VIOLATION * largest
     if not nodal and modes is not None:
         # facets without any force go on carrying none
-        share = mass * loaded[local].any(axis=1)[:, None, None]
+        used = np.asarray(loaded[local].any(axis=1), np.float64)
+        share = mass * used[:, None, None]
         body = _Bodies(share, local, target, modes)
         around = np.bincount(local.ravel(), share.sum(axis=2).ravel(), minlength=len(nodes) + 1)
         density = np.vstack([target, np.zeros((1, d))]) / np.where(around > 0, around, 1.0)[:, None]
@@ -226,13 +227,15 @@ def _divided(d: int) -> tuple[FloatArray, FloatArray]:
     For f linear, given at the corners, and g linear between the points.
     """
     k, M = PARTS, moments(d)
+    points: list[tuple[int, ...]]
+    parts: list[list[tuple[int, ...]]]
     if d == 2:
         points = [(k - i, i) for i in range(k + 1)]
         parts = [[(k - i, i), (k - i - 1, i + 1)] for i in range(k)]
     else:
         points = [(k - i - j, i, j) for i in range(k + 1) for j in range(k + 1 - i)]
         steps = [((0, 0, 0), (-1, 1, 0), (-1, 0, 1)), ((0, 0, 0), (-1, 0, 1), (0, -1, 1))]
-        every = [[tuple(np.add(p, s).tolist()) for s in step] for p in points for step in steps]
+        every = [[tuple(a + b for a, b in zip(p, s, strict=True)) for s in step] for p in points for step in steps]
         parts = [corners for corners in every if min(min(c) for c in corners) >= 0]
     place = {p: n for n, p in enumerate(points)}
     at, weight = np.array(points) / k, np.zeros((d, len(points)))
