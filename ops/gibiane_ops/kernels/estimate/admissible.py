@@ -183,7 +183,7 @@ def admissible_stress(
             tau = together if joined is None else joined.given_back(together)
             if joined is not None and joint is not None and limits is not None and work is not None:
                 changed = 2 * (limits.work(together) - work)[joined.sides]
-                contact = np.bincount(joined.facet, changed, len(joint.closed))
+                contact = np.bincount(joined.facet, changed, len(joint.closed)).astype(np.float64)
             history.append(float(np.sqrt(max(distance(1.0).sum() + given + contact.sum(), 0.0))))
         if joined is not None and limits is not None:
             exterior, excess = _with_contact(joined, exterior, tau), limits.excess(together)
