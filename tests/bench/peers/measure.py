@@ -26,6 +26,8 @@ from blocks import case, joined, stiffness
 
 HERE = Path(__file__).parent
 MU = 0.2
+PATIENCE = 400.0
+"""Seconds after which a code is stopped; none that finished took half of it."""
 CODES = ("CalculiX N2S", "CalculiX S2S", "GetFEM integral", "scikit-fem tied")
 COLUMNS = ("scene", "n", "code", "seconds", "ndof", "energy", "gap", "mu", "year", "month", "day", "runs")
 SCRIPT = """OPTI DIME 3 ELEM CUB8 ;
@@ -115,10 +117,10 @@ def measure(c, mu, code, command, folder):
     try:
         done = subprocess.run(
             [*command, *arguments, f"--nodes={nodes}"],
-            cwd=HERE, env=environment, capture_output=True, text=True, timeout=900,
+            cwd=HERE, env=environment, capture_output=True, text=True, timeout=PATIENCE,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return 900.0, 0, None, "not finished after 900 s"
+        return PATIENCE, 0, None, f"not finished after {PATIENCE:.0f} s"
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     if not lines:
         return 0.0, 0, None, (done.stderr.strip().splitlines() or ["no result"])[-1]
