@@ -5,50 +5,14 @@ from itertools import permutations
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from hanging_relations import relation_matrix
 
 from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, topology
 from gibiane_ops.kernels.adapt import bisection, hanging, hierarchy, octree
-from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.materials import isotropic
-
-
-def relation_matrix(n_points: int, nodes: IntArray, masters: IntArray) -> sp.csr_array:
-    """Write hanging nodes by the nodes that are free.
-
-    Parameters
-    ----------
-    n_points : int
-    nodes, masters
-        From `hanging_nodes`; a master may hang itself.
-
-    Returns
-    -------
-    (n_points, n_free) csr_array
-        Row i gives node i by the free nodes, in their order; rows add up to 1.
-    """
-    used = masters >= 0
-    row = np.repeat(np.arange(len(nodes)), used.sum(axis=1))
-    share = np.repeat(1.0 / used.sum(axis=1), used.sum(axis=1))
-    free = np.ones(n_points, bool)
-    free[nodes] = False
-    own = np.flatnonzero(free)
-    step = sp.csr_array(
-        (
-            np.concatenate([share, np.ones(len(own))]),
-            (np.concatenate([nodes[row], own]), np.concatenate([masters[used], own])),
-        ),
-        shape=(n_points, n_points),
-    )
-    T = step
-    while True:
-        further = sp.csr_array(T @ step)
-        if abs(further - T).max() == 0:
-            return sp.csr_array(T[:, own])
-        T = further
-
 
 NAMES = {("simplex", 2): "TRI3", ("simplex", 3): "TET4", ("tensor", 2): "QUA4", ("tensor", 3): "CUB8"}
 FAMILY = {2: "DEFO", 3: "TRID"}
