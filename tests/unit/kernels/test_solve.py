@@ -216,7 +216,6 @@ def test_multigrid_that_does_not_converge_gives_way_to_a_factorisation(monkeypat
     assert "2 iterations leave" in factor.notes[0]
 
 
-@pytest.mark.skipif(not packages.is_installed("pardiso"), reason="PARDISO IS NOT TESTED HERE: pip install pypardiso")
 def test_a_trial_that_takes_too_long_gives_way_without_a_note(two_packages):
     matrix = sp.kron(laplacian3(6), sp.eye_array(3), format="csr")
     patient = factorize(matrix, method="amg", block=3, reserve=True)
@@ -228,6 +227,7 @@ def test_a_trial_that_takes_too_long_gives_way_without_a_note(two_packages):
     np.testing.assert_allclose(matrix @ factor.solve(b), b, atol=1e-9)
 
 
+@pytest.mark.skipif(not packages.is_installed("pardiso"), reason="PARDISO IS NOT TESTED HERE: pip install pypardiso")
 def test_pardiso_gives_its_memory_back():
     from pypardiso import PyPardisoSolver
 
