@@ -16,7 +16,8 @@ WIDTH = 100
 def describe(op: Operator) -> str:
     """Return the notice of an operator as plain text."""
     lines = [f"{op.name}: {op.summary}", ""]
-    lines.extend("   " + form.usage(op.name) for form in op.all_forms())
+    for form in op.all_forms():
+        lines.extend(_wrapped(form.usage(op.name), "   ", "      "))
     operands = {a.name: (a, "|".join(a.types)) for f in op.forms for a in f.args if a.doc}
     keys = {k.words: k for f in op.forms for k in f.keys if k.doc}
     if operands or keys:
@@ -26,7 +27,9 @@ def describe(op: Operator) -> str:
         shown = "|".join(f"'{w}'" for w in words)
         lines.append(f"   {shown:<12} {'':<20} {key.doc}".rstrip())
     if op.notice:
-        lines.extend(["", *textwrap.wrap(op.notice, WIDTH)])
+        lines.append("")
+        for paragraph in op.notice.splitlines():
+            lines.extend(_wrapped(paragraph))
     if op.example:
         lines.extend(["", "Example:", *("   " + line for line in op.example.splitlines())])
     if op.see:
@@ -34,6 +37,12 @@ def describe(op: Operator) -> str:
     if op.source:
         lines.append(f"Source: {op.source}")
     return "\n".join(lines)
+
+
+def _wrapped(text: str, first: str = "", others: str = "") -> list[str]:
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=first, subsequent_indent=others, break_long_words=False, break_on_hyphens=False
+    )
 
 
 def header(word: str, text: str) -> str:
@@ -156,7 +165,7 @@ def _section(op: Operator) -> list[str]:
     if keys:
         lines.append("")
     if op.notice:
-        lines.extend([op.notice, ""])
+        lines.extend([op.notice.replace("\n", "\n\n"), ""])
     if op.example:
         lines.extend(["```", op.example, "```"])
     if op.see:

@@ -166,7 +166,8 @@ def test_graded_elements_take_a_factor_where_multigrid_iterates_long(session, co
     monkeypatch.setattr("gibiane_ops.kernels.contact.tied.SLOW", 1)
     monkeypatch.setattr("gibiane_ops.kernels.contact.tied.factor_is_faster", lambda *_: True)
     exact, _ = solve(session)
-    found, _ = solve(session, "OPTI 'RESO' 'ITER' ;")
+    found, _ = solve(session, "OPTI ECHO 1 'RESO' 'ITER' ;")
     assert contact_of(session).tied.direct
+    assert " RESO : multigrid iterates long on these elements, a factor takes over" in session.out.getvalue()
     for name, values in exact.items():
         np.testing.assert_allclose(found[name], values, atol=3e-8 * np.abs(values).max())

@@ -129,6 +129,8 @@ def run_on_bodies(
         if echo:
             ctx.write(f" RESO : {text}")
 
+    if prepared.way.method == "amg" and prepared.bodies.tied.direct:
+        say("multigrid iterates long on these elements, a factor takes over")
     found = solve_on_bodies(
         prepared.bodies, load, gap, law,
         lambda interface: method.solve(interface, law, **options),
