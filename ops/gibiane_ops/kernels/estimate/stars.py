@@ -12,6 +12,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.limits import Limits
 from gibiane_ops.kernels.estimate.macro import contraction, macro_element, moments, turned
 from gibiane_ops.kernels.estimate.simplices import Simplices, colours, others, slots
+from gibiane_ops.kernels.threads import one_thread
 
 PENALTY, PENALTY_PRESSED = 1e5, 1e8
 """Weight of the balance of each cell over the energy, in the augmented Lagrangian of a star; that of a star in contact,
@@ -223,6 +224,7 @@ class Improver:
             self.touching = np.zeros(mesh.n_stars, bool)
             self.touching[ends] = True
 
+    @one_thread()
     def sweep(self, tau: FloatArray) -> None:
         """Improve the tractions in place, `VISITS` times around each node on average.
 
@@ -246,7 +248,8 @@ class Improver:
 
         Cost
         ----
-        One Cholesky factor for each visit, of 9 unknowns a side in space (324 for 24 tetrahedra around a node).
+        One Cholesky factor for each visit, of 9 unknowns a side in space (324 for 24 tetrahedra around a node), on one
+        thread.
         """
         left = VISITS * self.n_used
         if self.gain is None:
