@@ -120,7 +120,7 @@ class Operands:
         if at < len(self.values):
             label = self.describe(at, None if lost is not None else wanted)
             labels, span = [label], label.span
-        template = "no {type} among its operands" if what is None else "no {type} ({what}) among its operands"
+        template = "no {type} among its operands" if not what else "no {type} ({what}) among its operands"
         failure = make(37, template, type=wanted, what=what, labels=labels, span=span)
         if lost is None:
             failure.hint = self.session.state.get("makers", {}).get(wanted.split(" ")[0])

@@ -344,7 +344,7 @@ def announce(table: Mapping[str, Sequence[str]]) -> None:
 
 
 def find(word: str) -> Operator | None:
-    """Return the operator that a word calls: by its first four letters, else by its whole name."""
+    """Return the operator that a word calls: by its first four letters, else by its whole name; a sentence calls none."""
     return _find_cached(word)
 
 
@@ -362,7 +362,7 @@ def spellings() -> list[str]:
 @lru_cache(maxsize=4096)
 def _find_cached(word: str) -> Operator | None:
     key = word[:4].rstrip()
-    if not key:
+    if not key or " " in word.rstrip():
         return None
     found = CATALOGUE.get(key)
     if found is not None:

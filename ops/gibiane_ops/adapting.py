@@ -24,7 +24,7 @@ from gibiane_ops.values.material import MATERIAL, on_zone, solid_zones
 from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import node_store
 from gibiane_ops.values.results import wanted_results
-from gibiane_ops.values.sizing import coincident, error_map, prescribed
+from gibiane_ops.values.sizing import coincident, error_map, prescribed, refuse_no_elements
 
 TAIL = extend("TAILLE")
 
@@ -40,7 +40,7 @@ WORKING = 1e-8
     Arg("sig", MCHAML, "stress at stress points", optional=True),
     Key("PREC", "prescribed relative error (needed)", Arg("e0", FLOTTANT)),
     Key("SEUL", "raise only, divide nothing"),
-    Key("NBMA", "number of elements", Arg("n", FLOTTANT)),
+    Key("NBMA", "largest number of elements", Arg("n", FLOTTANT)),
     gives=[CHPOINT, MCHAML, FLOTTANT, "(FLOTTANT)"],
 )
 def _degrees(
@@ -55,6 +55,7 @@ def _degrees(
     nbma: float | None,
 ) -> tuple[ChPoint, MChaml, float] | tuple[ChPoint, MChaml, float, float]:
     target = prescribed(ctx, prec)
+    refuse_no_elements(ctx, nbma)
     store = node_store(ctx)
     zones = solid_zones(ctx, model)
     error = error_map(ctx, carte, zones)

@@ -23,7 +23,7 @@ from gibiane_ops.values.material import MATERIAL, solid_zones
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.results import wanted_results
-from gibiane_ops.values.sizing import coincident, error_map, prescribed
+from gibiane_ops.values.sizing import coincident, error_map, prescribed, refuse_no_elements
 
 NEARLY = 1.01
 """An error that the smallest size makes larger by less than this is not worth a word."""
@@ -117,6 +117,7 @@ def _wanted(
     minn: bool,
 ) -> Any:
     prec = prescribed(ctx, prec)
+    refuse_no_elements(ctx, nbma)
     store = node_store(ctx)
     zones = solid_zones(ctx, model)
     error = error_map(ctx, carte, zones)

@@ -189,6 +189,7 @@ MECHANICS = {
     "{count} patches have too few elements: their nodes take the mean of the elements around them": "{count} ensembles ont trop peu d'éléments : leurs noeuds prennent la moyenne des éléments voisins",
     "a finer mesh, or LISSER 'MOYE'": "un maillage plus fin, ou LISSER 'MOYE'",
     "the projection does not converge: residual {residual} after {count} iterations": "la projection ne converge pas : résidu {residual} après {count} itérations",
+    "the largest number of elements is {value}: it must be above 0": "le nombre maximal d'éléments est {value} : il doit être positif",
     "BETA is a ratio of error densities: {value} cannot be one": "BETA est un rapport de densités d'erreur : {value} n'en est pas un",
     "'PLEIN' goes with 'SPR', not with '{method}'": "'PLEIN' va avec 'SPR', non avec '{method}'",
     "'PLEIN' is for QUA4 and CUB8, not for {shape}": "'PLEIN' est pour QUA4 et CUB8, non pour {shape}",

