@@ -344,7 +344,7 @@ def announce(table: Mapping[str, Sequence[str]]) -> None:
 
 
 def find(word: str) -> Operator | None:
-    """Return the operator that a word calls: by its first four letters, else by its whole name; a sentence calls none."""
+    """Return the operator that a word calls: by its first four letters, else by its name; a sentence calls none."""
     return _find_cached(word)
 
 

@@ -24,8 +24,8 @@ NODES = {
 
 DOUBT = 4.0
 """Factor on the squared errors of linear elements in the choice: beside them quadratic ones lose mid-nodes, and what is
-known of them is the least error that they can have. Measured: with 1 hp needed as many nodes as before the choice on the
-L-shaped plate, and 4 % more on the footing."""
+known of them is the least error that they can have. Measured: with 1 hp needed as many nodes as before the choice on
+the L-shaped plate, and 4 % more on the footing."""
 
 
 @dataclass(frozen=True, eq=False)
