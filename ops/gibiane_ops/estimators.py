@@ -9,8 +9,9 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
+from gibiane_ops.kernels.contact.node_pairs import all_partners
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.estimate.contact import densities
+from gibiane_ops.kernels.estimate.contact import densities, with_following
 from gibiane_ops.kernels.estimate.residual import FACETS, INTERIOR, residuals
 from gibiane_ops.kernels.estimate.zz import SolidError, stress_energy
 from gibiane_ops.kernels.recovery import StressBlock
@@ -84,20 +85,23 @@ def _add_contact(ctx: Context, zones: list[ModelZone], sides: list[Side], contac
     store, dim = node_store(ctx), zones[0].dim
     for zone in contact.contacts:
         pairs = zone_pairs(ctx, zone, "reaction")
-        if not pairs.plain.all():
+        if not pairs.coincident:
             ctx.fail(
                 251,
                 "contact residuals need surfaces whose nodes coincide; these have different meshes",
                 at="reaction",
                 hint="without 'REAC' the contact surfaces count as free of load",
             )
-        slave, master = pairs.pairs.T
+        slave = pairs.pairs[:, 0]
         force = rea.table(FORCES[zones[0].family], slave)[:, :dim]
         blocks = zone.slave.kernel_blocks
         with worded(ctx, at="reaction"):
-            density = densities(store.coords[:, :dim], blocks, slave, force)
+            density = densities(store.coords[:, :dim], blocks, slave, force, axisymmetric=zones[0].axisymmetric)
+        every, follow = with_following(blocks, slave)
         at_node, partner = np.zeros((store.count, dim)), np.full(store.count, -1, np.int64)
-        at_node[slave], partner[slave] = density, master
+        at_node[every] = follow @ density
+        own, other = all_partners(pairs.pairs, blocks, zone.master.kernel_blocks).T
+        partner[own] = other
         for name, cells in blocks:
             add_tractions(sides, name, cells, at_node[cells])
             both = (partner[cells] >= 0).all(axis=1)
@@ -147,15 +151,8 @@ def _explicit_residuals(
 ) -> Any:
     stress, material, _ = stresses_of(ctx, sig, mat, None)
     zones = solid_zones(ctx, model)
-    wrong = next((z for z in zones if shape(z.shape).degree > 1 or z.axisymmetric or z.bars), None)
-    if wrong is not None:
-        ctx.fail(
-            251,
-            "explicit residuals are made on linear elements in space or in a plane, not on {shape} in mode {mode}",
-            at="model",
-            shape=wrong.shape,
-            mode=wrong.mode,
-        )
+    if any(zone.bars for zone in zones):
+        ctx.fail(251, "explicit residuals are made on solids, not on bars", at="model")
     inside, across = constants or (INTERIOR, FACETS)
     sides = exterior(ctx, zones, cl, pres, fsur)
     if reaction is not None:
@@ -179,10 +176,11 @@ def _explicit_residuals(
             {side.facets.name: side.free for side in sides},
             interior=inside,
             facets=across,
+            axisymmetric=zones[0].axisymmetric,
         )
         errors = []
         for block, law, error in zip(blocks, laws, found.total, strict=True):
-            energy = stress_energy(points, block, law)
+            energy = stress_energy(points, block, law, axisymmetric=zones[0].axisymmetric)
             errors.append(SolidError(error, energy, 4 * energy + error))
     more = {
         "VOLUME": float(np.sqrt(sum(each.sum() for each in found.interior))),

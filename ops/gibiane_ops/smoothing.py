@@ -9,6 +9,7 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, MCHAML, MMODEL
+from gibiane_ops.kernels.contact.node_pairs import all_partners
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery.patches import TENSOR
 from gibiane_ops.kernels.supports import moved
@@ -161,16 +162,16 @@ def _check_full(ctx: Context, model: Modele, method: str | None) -> None:
 
 def _pairs(ctx: Context, contact: Modele) -> IntArray:
     """Return the pairs of coincident nodes of a contact model."""
-    found = [zone_pairs(ctx, zone, "joint") for zone in contact.contacts]
-    if not found or not all(each.plain.all() for each in found):
+    zones = [(zone, zone_pairs(ctx, zone, "joint")) for zone in contact.contacts]
+    if not zones or not all(pairs.coincident for _, pairs in zones):
         ctx.fail(
             21,
             "patches across a contact need a contact model between surfaces whose nodes coincide",
             at="joint",
             hint="mesh the contact surface once and copy it for the other solid",
         )
-    pairs = np.concatenate([each.pairs for each in found])
-    return np.asarray(pairs[(pairs >= 0).all(axis=1)], np.int64)
+    found = [all_partners(p.pairs, z.slave.kernel_blocks, z.master.kernel_blocks) for z, p in zones]
+    return np.concatenate(found)
 
 
 def _field(ctx: Context, solids: list[Solid], where: str | None) -> MChaml | ChPoint:

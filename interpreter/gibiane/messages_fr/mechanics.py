@@ -219,7 +219,7 @@ MECHANICS = {
     "solve on linear elements before the estimate": "résoudre sur des éléments linéaires avant l'estimation",
     "the stress does not balance the loads given: {count} nodes keep a force, first node {node} at ({where}), force ({force})": "la contrainte n'équilibre pas le chargement donné : il reste une force à {count} noeuds, le premier {node} en ({where}), force ({force})",
     "give every load by 'PRES', 'FSUR' or 'VOLU' and the supports; forces and supports at single points or lines, and contact, are not balanced by tractions": "donner tout le chargement par 'PRES', 'FSUR' ou 'VOLU' et les appuis ; forces et appuis ponctuels ou linéiques, ainsi que le contact, ne s'équilibrent pas par des vecteurs contrainte",
-    "explicit residuals are made on linear elements in space or in a plane, not on {shape} in mode {mode}": "les résidus explicites se calculent sur des éléments linéaires, dans l'espace ou le plan, non sur des {shape} en mode {mode}",
+    "explicit residuals are made on solids, not on bars": "les résidus explicites se calculent sur des solides, non sur des barres",
     "one value an element does not show the error of {shape}, whose stress is best at the centre": "une valeur par élément ne montre pas l'erreur des {shape}, dont la contrainte est la meilleure au centre",
     "give the exact stress at the nodes (CHAN 'CHAM') or at the points 'MASSE'": "donner la contrainte exacte aux noeuds (CHAN 'CHAM') ou aux points 'MASSE'",
     "{name}.'{component}' must be a LISTREEL of {count} values, one a point": "{name}.'{component}' doit être un LISTREEL de {count} valeurs, une par point",

@@ -6,7 +6,7 @@ the blocks in their order: the cells of the second block follow those of the fir
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -183,15 +183,27 @@ def boundary(blocks: Sequence[Block]) -> dict[str, Facets]:
     Returns
     -------
     dict of str to Facets
-        By shape of facet; normals leave the solid. Shapes without a boundary facet are absent.
+        By shape of facet; normals leave the solid. Shapes without a boundary facet are absent. A linear cell and one of
+        second degree share the facet that has the same corners.
     """
     result = {}
-    for name, facets in faces_of(blocks).items():
-        group, _ = group_by_nodes(facets.nodes[:, : shape(name).n_corners])
-        alone = np.flatnonzero(np.bincount(group)[group] == 1)
-        if len(alone):
-            result[name] = facets.take(alone)
+    every = faces_of(blocks)
+    for family in families(every):
+        group, _ = group_by_nodes(np.vstack([every[name].nodes[:, : shape(name).n_corners] for name in family]))
+        alone = np.bincount(group)[group] == 1
+        for name in family:
+            here, alone = np.split(alone, [len(every[name].nodes)])
+            if here.any():
+                result[name] = every[name].take(np.flatnonzero(here))
     return result
+
+
+def families(names: Iterable[str]) -> list[list[str]]:
+    """Group shapes of the same corners, linear and of second degree, in order of first appearance."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        found.setdefault(LINEAR.get(name, name), []).append(name)
+    return list(found.values())
 
 
 def neighbours(blocks: Sequence[Block]) -> IntArray:

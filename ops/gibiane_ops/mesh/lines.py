@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, operator
 from gibiane.values import ENTIER, FLOTTANT, LISTREEL, MAILLAGE, POINT
+from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.mesh import arcs, chains, edges, transforms
 from gibiane_ops.mesh.building import (
@@ -16,6 +18,7 @@ from gibiane_ops.mesh.building import (
     axis_end,
     dimension,
     explained,
+    join,
     line_between,
     new_mesh,
     nodes_of,
@@ -24,6 +27,7 @@ from gibiane_ops.mesh.building import (
     reversed_mesh,
 )
 from gibiane_ops.mesh.degree import is_quadratic, linear_mesh, quadratic_mesh
+from gibiane_ops.mesh.elements import choose
 from gibiane_ops.mesh.paths import COUNT, DFIN, DINI, ENDS, End, end_sizes, first_node, last_node, line_along
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Maillage, Point
@@ -275,7 +279,12 @@ CONT = operator(
 )
 def _contour(ctx: Context, g: Maillage, which: str | None, noid: bool) -> Maillage:
     if is_quadratic(g):
-        return quadratic_mesh(ctx, _contour(ctx, linear_mesh(ctx, g), which, noid))
+        line = _contour(ctx, linear_mesh(ctx, g), which, noid)
+        bent = [_has_middle(g, block.cells) for block in line.blocks]
+        straight = [~rows for rows in bent]
+        # the sides of linear elements stay linear
+        parts = [quadratic_mesh(ctx, choose(line, bent)), choose(line, straight)]
+        return join([part for part in parts if part.n_cells] or [line])
     surface = [b for b in g.kernel_blocks if DIMENSION[b[0]] == 2]
     found = edges.contour(surface, which or "EXTE")
     if len(found) == 0:
@@ -289,6 +298,13 @@ def _contour(ctx: Context, g: Maillage, which: str | None, noid: bool) -> Mailla
             hint="a closed surface has none, and ENVE gives the boundary of a volume; 'NOID' accepts an empty result",
         )
     return new_mesh(ctx, [("SEG2", found[chains.walk(found)])])
+
+
+def _has_middle(g: Maillage, ends: IntArray) -> NDArray[np.bool_]:
+    """Tell which edges, (k, 2), are those of elements of second degree."""
+    known = topology.middles([b for b in g.kernel_blocks if DIMENSION[b[0]] == 2])[:, :2]
+    group, _ = topology.group_by_nodes(np.vstack([ends, known]))
+    return np.isin(group[: len(ends)], group[len(ends) :])
 
 
 COTE = operator(

@@ -37,21 +37,22 @@ def unbalanced(
 
     `contact` gives nodes and forces that act on them beside the loads; directions that are held keep no force.
     """
-    store, dim = node_store(ctx), zones[0].dim
+    store, dim, axis = node_store(ctx), zones[0].dim, zones[0].axisymmetric
     nodes = used_nodes([z.cells for z in zones])
     points = store.coords[nodes][:, :dim]
     force, scale = np.zeros((len(nodes), dim)), 0.0
     for zone in zones:
         of, cells = shape(zone.shape), places_in(nodes, zone.cells)
         values = moved(of, on_zone(ctx, stress, zone, "stress").values, stress.support, "STRESSES")
-        inner = elasticity.internal_forces(of, points[cells], values)
+        inner = elasticity.internal_forces(of, points[cells], values, axisymmetric=axis)
         scale = max(scale, float(np.abs(inner).max(initial=0.0)))
         np.add.at(force, cells, -inner)
         if volu is not None:
-            np.add.at(force, cells, integrals.distributed_load(of, points[cells], volu.coords[:dim]))
+            load = integrals.distributed_load(of, points[cells], volu.coords[:dim], axisymmetric=axis)
+            np.add.at(force, cells, load)
     for side in sides:
         places = np.searchsorted(nodes, side.facets.nodes)
-        np.add.at(force, places, np.matmul(integrals.face_mass(shape(side.facets.name), points[places]), side.traction))
+        np.add.at(force, places, side.forces(store.coords[:, :dim], axisymmetric=axis))
     for where, values in contact:
         np.add.at(force, np.searchsorted(nodes, where), values)
     known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)

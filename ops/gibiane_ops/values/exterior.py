@@ -11,7 +11,8 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, POINT, RIGIDITE
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import geometry, integrals, topology
+from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.topology import Facets
 from gibiane_ops.values.champs import ChPoint
@@ -55,11 +56,26 @@ class Side:
         Imposed traction at the nodes of each facet.
     free : (k, d, d) float64
         Projector on the directions held at all the nodes of a facet, where the traction is a reaction.
+    pressure : (k, n) float64, force / length^(d - 1), optional
+        The pressures at the nodes, whose tractions are a part of `traction`.
     """
 
     facets: Facets
     traction: FloatArray
     free: FloatArray
+    pressure: FloatArray | None = None
+
+    def forces(self, points: FloatArray, *, axisymmetric: bool = False) -> FloatArray:
+        """Return the nodal forces that the tractions stand for, (k, n, d): a pressure follows the bends of its facets.
+
+        Tractions of a pressure are exact at the nodes of a bent facet; between them, normals are no polynomials.
+        """
+        of, X = shape(self.facets.name), points[self.facets.nodes]
+        traction, given = self.traction, np.zeros_like(self.traction)
+        if self.pressure is not None:
+            traction = traction + self.pressure[..., None] * nodal_normals(of, X)
+            given = integrals.pressure_load(of, X, self.pressure, axisymmetric=axisymmetric)
+        return given + np.matmul(integrals.element_mass(of, X, axisymmetric=axisymmetric), traction)
 
 
 def exterior(
@@ -81,13 +97,14 @@ def exterior(
         boundary = topology.boundary([(z.shape, z.cells) for z in zones])
     known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
     for name, facets in boundary.items():
-        normal = geometry.facet_normals(shape(name), points[facets.nodes])
+        normal = nodal_normals(shape(name), points[facets.nodes])
         value = np.zeros((len(facets.nodes), shape(name).n_nodes, dim))
+        pressure = np.zeros(value.shape[:2])
         for p, surface in pressures:
             here = _rows(facets, surface, name)
             nodes = facets.nodes[here]
             at = p.at(p.names[0], nodes.ravel()).reshape(nodes.shape) if isinstance(p, ChPoint) else p
-            value[here] -= np.broadcast_to(at, nodes.shape)[..., None] * normal[here][:, None]
+            pressure[here] += np.broadcast_to(at, nodes.shape)
         for v, surface in tractions:
             here = _rows(facets, surface, name)
             nodes = facets.nodes[here]
@@ -95,7 +112,8 @@ def exterior(
                 value[here] += v.table(FORCES[zones[0].family], nodes.ravel()).reshape(*nodes.shape, dim)
             else:
                 value[here] += v.coords[:dim]
-        sides.append(Side(facets, value, _common(known, held, facets.nodes)))
+        value -= pressure[..., None] * normal
+        sides.append(Side(facets, value, _common(known, held, facets.nodes), pressure))
     for where, surface in [("pres", g) for _, g in pressures] + [("fsur", g) for _, g in tractions]:
         found = sum(len(_rows(side.facets, surface, side.facets.name)) for side in sides)
         if found < surface.n_cells:
@@ -108,6 +126,15 @@ def exterior(
                 hint="take them from the same mesh as the model: FACE, ENVE, ELEM 'APPU'",
             )
     return sides
+
+
+def nodal_normals(of: Shape, X: FloatArray) -> FloatArray:
+    """Return unit normals at the nodes of facets, (k, n, d): of linear ones that of the middle, everywhere."""
+    if of.degree == 1:
+        return np.repeat(geometry.facet_normals(of, X)[:, None], of.n_nodes, axis=1)
+    geometry.check_cells(of, X, of.ref_nodes)
+    normal = geometry.normal_densities(of, X, of.ref_nodes)
+    return np.asarray(normal / np.linalg.norm(normal, axis=2, keepdims=True), np.float64)
 
 
 def add_tractions(sides: Sequence[Side], name: str, nodes: IntArray, values: FloatArray) -> int:

@@ -6,7 +6,7 @@ import pytest
 from gibiane_ops.kernels import assembly, integrals, topology
 from gibiane_ops.kernels.adapt.contact_degrees import contact_facets, paired_degrees
 from gibiane_ops.kernels.contact import facets as contact_surfaces
-from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.contact.node_pairs import all_partners, node_pairs
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.contact import densities, with_following
 
@@ -111,6 +111,10 @@ def test_mixed_facets_pair_without_the_middles_that_follow():
     assert not len(found.unpaired_slave)
     assert not len(found.unpaired_master)
     assert sorted(found.pairs[found.middles[:, 0], 0].tolist()) == [5, 7, 8]
+    # their partners are known all the same
+    every = all_partners(found.pairs, facets, other)
+    assert every[:8].tolist() == found.pairs.tolist()
+    assert sorted(every[8:].tolist()) == [[6, 16], [9, 19]]
 
 
 @pytest.mark.parametrize("lumped", [False, True])

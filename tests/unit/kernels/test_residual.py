@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from boxes import mesh
 
+from gibiane_ops.kernels import geometry
+from gibiane_ops.kernels.arrays import stress_tensor, traction
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.effectivity import effectivity
 from gibiane_ops.kernels.estimate.residual import residuals
@@ -54,3 +57,104 @@ def test_effectivity_by_hand():
     assert quality.theta == pytest.approx(np.sqrt(37 / 5), rel=1e-14)
     assert quality.deviation == pytest.approx(0.5, rel=1e-14)
     assert np.isnan(effectivity(np.ones(2), np.zeros(2)).theta)
+
+
+def sampled(name, points, cells, stress):
+    of = shape(name)
+    return StressBlock(of, cells, stress(geometry.positions(of, points[cells], of.gauss[0])))
+
+
+def on_boundary(blocks, points, stress):
+    """Tractions of a stress at the nodes of straight boundary facets."""
+    given = {}
+    for name, facets in boundary([(block.shape.name, block.cells) for block in blocks]).items():
+        X = points[facets.nodes]
+        given[name] = traction(stress(X), geometry.facet_normals(shape(name), X)[:, None])
+    return given
+
+
+def largest(points, blocks, body, given, **how):
+    free = {name: np.zeros((len(t), *2 * points.shape[1:])) for name, t in given.items()}
+    part = residuals(points, blocks, [np.ones(len(b.cells)) for b in blocks], body, given, free, **how)
+    return max(each.max() for some in (part.interior, part.jumps, part.boundary) for each in some)
+
+
+SPACE = ("TET4", "PRI6", "PYR5", "CUB8", "TE10", "PR15", "PY13", "CU20")
+PLANE = ("TRI3", "QUA4", "TRI6", "QUA8")
+
+
+@pytest.mark.parametrize("name", PLANE + SPACE)
+def test_stress_in_balance_has_no_residual(name):
+    d = shape(name).dim
+    points, cells = mesh(name, *(2,) * d)
+    c = {2: 4, 3: 6}[d]
+    value, slope = np.random.default_rng(1).normal(size=c), np.random.default_rng(2).normal(size=(c, d))
+    # what one point of a linear simplex cannot carry is left out: a pyramid's points lie near its faces
+    slope *= name not in ("TRI3", "TET4", "PRI6", "PYR5")
+
+    def stress(x):
+        return value + x @ slope.T
+
+    body = -sum(stress_tensor(slope[:, k])[:d, k] for k in range(d))
+    blocks = [sampled(name, points, cells, stress)]
+    given = on_boundary(blocks, points, stress)
+    assert largest(points, blocks, body, given) < 1e-24
+    # each of the three parts sees what is wrong
+    assert largest(points, blocks, body + 9, given) > 1e-3
+    assert largest(points, blocks, body, {each: t + 1 for each, t in given.items()}) > 1e-3
+
+
+@pytest.mark.parametrize("name", ["QUA4", "TRI6", "QUA8"])
+def test_stress_in_balance_round_an_axis(name):
+    points, cells = mesh(name, 3, 2)
+    points = points + [0.5, 0.0]
+
+    def stress(x):
+        r, z = x[..., 0], x[..., 1]
+        return np.stack([1 + 2 * r + 3 * z, 4 - r + 5 * z, 1 - 6 * r + 3 * z, 7 * r], axis=-1)
+
+    # div: 2 + (2 + 6), and 7 + 5 + 7 r / r
+    blocks = [sampled(name, points, cells, stress)]
+    given = on_boundary(blocks, points, stress)
+    assert largest(points, blocks, np.array([-10.0, -19.0]), given, axisymmetric=True) < 1e-24
+    assert largest(points, blocks, np.array([-2.0, -12.0]), given, axisymmetric=True) > 0.1
+    assert largest(points, blocks, np.array([-2.0, -12.0]), given) < 1e-24
+
+
+@pytest.mark.parametrize(("kinds", "degree"), [(("QUA4", "QUA4"), 1), (("QUA4", "QUA8"), 2), (("QUA8", "QUA8"), 2)])
+@pytest.mark.parametrize("axis", [False, True])
+def test_jump_across_a_side(kinds, degree, axis):
+    # Two squares of side 2; sigma_xx is y - 1 on the right, 0 on the left: int (y - 1)^2 = 2 / 3, times 2 pi 3.
+    corners = np.array([[1.0, 0], [3, 0], [3, 2], [1, 2], [5, 0], [5, 2]])
+    middles = np.array([[2.0, 0], [3, 1], [2, 2], [1, 1], [4, 0], [5, 1], [4, 2]])
+    points = np.vstack([corners, middles])
+    # the right one starts at its upper corner: the order along the side differs
+    cells = {"QUA4": ([0, 1, 2, 3], [5, 2, 1, 4]), "QUA8": ([0, 1, 2, 3, 6, 7, 8, 9], [5, 2, 1, 4, 12, 7, 10, 11])}
+    blocks = []
+    for i, name in enumerate(kinds):
+        values = lambda x, i=i: np.stack([i * (x[..., 1] - 1)] + [0 * x[..., 1]] * 3, axis=-1)  # noqa: E731
+        blocks.append(sampled(name, points, np.array([cells[name][i]]), values))
+    if kinds[0] == kinds[1]:
+        cells, values = (np.concatenate(each) for each in zip(*[(b.cells, b.stress) for b in blocks], strict=True))
+        blocks = [StressBlock(blocks[0].shape, cells, values)]
+    edge = boundary([(block.shape.name, block.cells) for block in blocks])
+    given = {name: np.zeros((*f.nodes.shape, 2)) for name, f in edge.items()}
+    free = {name: np.tile(np.eye(2), (len(f.nodes), 1, 1)) for name, f in edge.items()}
+    young = [np.ones(len(b.cells)) for b in blocks]
+    part = residuals(points, blocks, young, np.zeros(2), given, free, axisymmetric=axis)
+    wanted = 2 / degree / 24 * (2 / 3) / 2 * (6 * np.pi if axis else 1)
+    assert np.concatenate(part.jumps) == pytest.approx([wanted] * 2, rel=1e-13)
+    assert np.concatenate(part.boundary) == pytest.approx([0, 0], abs=1e-14)
+
+
+def test_normals_turn_along_a_bent_side():
+    # A pressure of 1 everywhere against none imposed: |sigma n| = 1, so the integral is the length of the sides.
+    points = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [0.5, -0.2], [1, 0.5], [0.5, 1], [0, 0.5]])
+    block = StressBlock(shape("QUA8"), np.arange(8)[None], np.tile([-1.0, -1, 0, 0], (1, 9, 1)))
+    given, free = {"SEG3": np.zeros((4, 3, 2))}, {"SEG3": np.zeros((4, 2, 2))}
+    part = residuals(points, [block], [np.ones(1)], np.zeros(2), given, free)
+    xi, w = np.polynomial.legendre.leggauss(3)
+    # y = -0.2 (1 - s^2) with x = (1 + s) / 2
+    length = 3 + np.sqrt(0.25 + (0.4 * xi) ** 2) @ w
+    # sides have h = 1 all of them: corners count
+    assert part.boundary[0] == pytest.approx([length / 48], rel=1e-13)

@@ -117,3 +117,12 @@ def test_places_of_nodes_in_a_list() -> None:
     cells = np.array([[2, 5, 9], [7, 9, 2]])
     assert topology.places_in(nodes, cells).tolist() == [[1, 2, 0], [3, 0, 1]]
     assert topology.places_in(nodes[:0], cells[:0]).shape == (0, 3)
+
+
+def test_a_linear_and_a_quadratic_cell_share_a_facet():
+    # TRI3 (0 1 2) and TRI6 (1 3 2): the side 1-2 is inside, with a middle or without
+    blocks = [("TRI3", np.array([[0, 1, 2]])), ("TRI6", np.array([[1, 3, 2, 4, 5, 6]]))]
+    found = topology.boundary(blocks)
+    assert found["SEG2"].nodes.tolist() == [[0, 1], [2, 0]]
+    assert found["SEG3"].nodes.tolist() == [[1, 3, 4], [3, 2, 5]]
+    assert found["SEG3"].cell.tolist() == [1, 1]

@@ -12,7 +12,7 @@ from gibiane_ops.kernels.contact.facets import Surface, integrals, middles_of, s
 from gibiane_ops.kernels.contact.outward import nodal_normals
 from gibiane_ops.kernels.contact.pairs import FACING, ROUND_OFF, ContactPairs
 from gibiane_ops.kernels.errors import EmptyContact
-from gibiane_ops.kernels.topology import Block, middles_on_linear
+from gibiane_ops.kernels.topology import Block, group_by_nodes, middles, middles_on_linear
 
 
 def node_pairs(
@@ -104,6 +104,34 @@ def node_pairs(
         area=integrals(points, surface, axisymmetric)[kept],
         size=surface.size[kept],
     )
+
+
+def all_partners(pairs: IntArray, slave: Sequence[Block], master: Sequence[Block]) -> IntArray:
+    """Add the middles on the sides of linear facets to pairs of nodes.
+
+    Parameters
+    ----------
+    pairs : (n, 2) int64
+        Slave node and master node; -1 where there is none.
+    slave, master : sequence of (shape name, (m, n_nodes) int64)
+
+    Returns
+    -------
+    (k, 2) int64
+        The pairs with two nodes, then those of middles whose corners are paired.
+    """
+    found = pairs[(pairs >= 0).all(axis=1)]
+    own, other = middles(slave), middles(master)
+    own = own[np.isin(own[:, :2], found[:, 0]).all(axis=1) & ~np.isin(own[:, 2], found[:, 0])]
+    if not len(own) or not len(other):
+        return np.asarray(found, np.int64)
+    order = np.argsort(found[:, 0])
+    ends = found[order[np.searchsorted(found[order, 0], own[:, :2])], 1]
+    group, _ = group_by_nodes(np.vstack([other[:, :2], ends]))
+    middle = np.full(int(group.max()) + 1, -1, np.int64)
+    middle[group[: len(other)]] = other[:, 2]
+    led = np.column_stack([own[:, 2], middle[group[len(other) :]]])
+    return np.vstack([found, led[led[:, 1] >= 0]]).astype(np.int64)
 
 
 def _with_corners(surface: Surface, kept: IntArray) -> IntArray:

@@ -125,6 +125,11 @@ class ContactPairs:
         plain[self.middles[:, 0]] = False
         return plain
 
+    @property
+    def coincident(self) -> bool:
+        """Whether the nodes of the two surfaces lie together, or those of one before an obstacle."""
+        return not len(self.row)
+
     def matrix(self, n_nodes: int) -> sp.csr_array:
         """Give the relative displacements from those of the nodes, one component: ``w = matrix @ u``.
 

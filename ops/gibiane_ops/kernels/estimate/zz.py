@@ -126,7 +126,9 @@ def true_error(
     )
 
 
-def stress_energy(points: FloatArray, block: StressBlock, compliance: FloatArray) -> FloatArray:
+def stress_energy(
+    points: FloatArray, block: StressBlock, compliance: FloatArray, *, axisymmetric: bool = False
+) -> FloatArray:
     """Integrate ``s_h : D^-1 : s_h`` over each cell by the stiffness rule, (m,).
 
     Parameters
@@ -134,8 +136,7 @@ def stress_energy(points: FloatArray, block: StressBlock, compliance: FloatArray
     points : (n_points, dim) float64, length
     block : StressBlock
     compliance : (c, c) or (m, c, c) float64, length^2 / force
+    axisymmetric : bool
     """
-    xi, density = _integration(block.shape, points[block.cells], False)
-    return _energy(
-        np.broadcast_to(block.stress, (len(block.cells), len(xi), block.stress.shape[2])), density, compliance
-    )
+    X, rule = points[block.cells], block.shape.gauss
+    return _energy(block.stress, geometry.point_measures(block.shape, X, rule, axisymmetric=axisymmetric), compliance)
