@@ -75,7 +75,8 @@ class Side:
         if self.pressure is not None:
             traction = traction + self.pressure[..., None] * nodal_normals(of, X)
             given = integrals.pressure_load(of, X, self.pressure, axisymmetric=axisymmetric)
-        return given + np.matmul(integrals.element_mass(of, X, axisymmetric=axisymmetric), traction)
+        M = integrals.element_mass(of, X, axisymmetric=axisymmetric)
+        return np.asarray(given + np.matmul(M, traction), np.float64)
 
 
 def exterior(
