@@ -10,7 +10,7 @@ from gibiane_ops.kernels.contact.condense import condense
 from gibiane_ops.kernels.contact.facets import integrals, surface_of
 from gibiane_ops.kernels.contact.gauss_seidel import solve_gauss_seidel
 from gibiane_ops.kernels.contact.newton import solve_coulomb
-from gibiane_ops.kernels.contact.node_pairs import node_pairs
+from gibiane_ops.kernels.contact.node_pairs import node_pairs, with_surface
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
 from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.kernels.elasticity import element_stiffness
@@ -98,6 +98,18 @@ def test_obstacle_in_the_plane_with_many_facets():
     assert (np.diff(pairs.gap[4:]) > 0).all()
     with pytest.raises(EmptyContact):
         obstacle_pairs(points, [("SEG2", slave)], [("SEG2", obstacle[:2])])
+
+
+def test_middles_beside_a_linear_facet_follow_their_corners():
+    # a square of one quadratic and one linear triangle: the middle of the diagonal, node 6, is tied to its ends
+    points = np.array([[0, 0, 0.1], [1, 0, 0.1], [1, 1, 0.1], [0, 1, 0.1], [0.5, 0, 0.1], [1, 0.5, 0.1], [0.5, 0.5, 0.1],
+                       [-3, -3, 0], [4, -3, 0], [4, 4, 0], [-3, 4, 0]])  # fmt: skip
+    slave = [("TRI6", np.array([[0, 1, 2, 4, 5, 6]])), ("TRI3", np.array([[0, 2, 3]]))]
+    found = obstacle_pairs(points, slave, [("QUA4", np.array([[7, 8, 9, 10]]))])
+    for pairs in (found, with_surface(found, points, slave, False)):
+        np.testing.assert_array_equal(np.sort(pairs.pairs[:, 0]), [0, 1, 2, 3, 4, 5])
+        assert len(pairs.unpaired_slave) == 0
+        np.testing.assert_allclose(pairs.gap, 0.1)
 
 
 def test_obstacle_that_looks_away():

@@ -173,7 +173,7 @@ def with_surface(pairs: ContactPairs, points: FloatArray, slave: Sequence[Block]
     place = place[kept]
     found = replace(
         pairs.only(kept),
-        unpaired_slave=np.setdiff1d(surface.nodes, surface.nodes[place]),
+        unpaired_slave=np.setdiff1d(surface.nodes, np.union1d(surface.nodes[place], middles_on_linear(slave)[:, 2])),
         middles=_middles(surface, place),
         area=integrals(points, surface, axisymmetric)[place],
         size=surface.size[place],

@@ -11,7 +11,7 @@ from gibiane_ops.kernels.contact.outward import nodal_normals
 from gibiane_ops.kernels.contact.pairs import FACING, ROUND_OFF, ContactPairs
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import EmptyContact
-from gibiane_ops.kernels.topology import Block
+from gibiane_ops.kernels.topology import Block, middles_on_linear
 
 INSIDE = 1e-6
 """How far outside a facet, over its size, a projection still belongs to it."""
@@ -45,13 +45,16 @@ def obstacle_pairs(points: FloatArray, slave: Sequence[Block], obstacle: Sequenc
     Notes
     -----
     Among the facets on which a node projects, the nearest counts. Nodes that project on none stay free of contact, and
-    so do those whose surface looks away from the obstacle when others face it.
+    so do those whose surface looks away from the obstacle when others face it. A middle of a quadratic facet on the side
+    of a linear one follows its corners: it makes no pair, and is not left alone.
 
     Cost
     ----
     A k-d tree of the facets.
     """
     nodes, own_normals = nodal_normals(points, slave)
+    own = ~np.isin(nodes, middles_on_linear(slave)[:, 2])
+    nodes, own_normals = nodes[own], own_normals[own]
     corners = _simplices(points, obstacle)
     if not len(nodes) or not len(corners):
         raise EmptyContact("a surface without facets")
