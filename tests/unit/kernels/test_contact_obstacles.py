@@ -102,8 +102,8 @@ def test_obstacle_in_the_plane_with_many_facets():
 
 def test_middles_beside_a_linear_facet_follow_their_corners():
     # a square of one quadratic and one linear triangle: the middle of the diagonal, node 6, is tied to its ends
-    points = np.array([[0, 0, 0.1], [1, 0, 0.1], [1, 1, 0.1], [0, 1, 0.1], [0.5, 0, 0.1], [1, 0.5, 0.1], [0.5, 0.5, 0.1],
-                       [-3, -3, 0], [4, -3, 0], [4, 4, 0], [-3, 4, 0]])  # fmt: skip
+    square = [[0, 0, 0.1], [1, 0, 0.1], [1, 1, 0.1], [0, 1, 0.1], [0.5, 0, 0.1], [1, 0.5, 0.1], [0.5, 0.5, 0.1]]
+    points = np.array([*square, [-3, -3, 0], [4, -3, 0], [4, 4, 0], [-3, 4, 0]])
     slave = [("TRI6", np.array([[0, 1, 2, 4, 5, 6]])), ("TRI3", np.array([[0, 2, 3]]))]
     found = obstacle_pairs(points, slave, [("QUA4", np.array([[7, 8, 9, 10]]))])
     for pairs in (found, with_surface(found, points, slave, False)):

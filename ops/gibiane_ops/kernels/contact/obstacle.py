@@ -45,8 +45,8 @@ def obstacle_pairs(points: FloatArray, slave: Sequence[Block], obstacle: Sequenc
     Notes
     -----
     Among the facets on which a node projects, the nearest counts. Nodes that project on none stay free of contact, and
-    so do those whose surface looks away from the obstacle when others face it. A middle of a quadratic facet on the side
-    of a linear one follows its corners: it makes no pair, and is not left alone.
+    so do those whose surface looks away from the obstacle when others face it. A middle of a quadratic facet on the
+    side of a linear one follows its corners: it makes no pair, and is not left alone.
 
     Cost
     ----
