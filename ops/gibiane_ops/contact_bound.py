@@ -57,7 +57,7 @@ FLAT = 1e-6
     *LOADS,
     Key(
         "BALAYAGES",
-        "improvements around each node (2); in a plane of the whole: one is the best",
+        "improvements (2): from the second on with smaller cells where much is left",
         Arg("n", ENTIER),
         name="sweeps",
     ),

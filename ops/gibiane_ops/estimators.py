@@ -42,7 +42,7 @@ RESIDUALS = Guarantee(False, "explicit residuals follow the error up to a factor
     *LOADS,
     Key(
         "BALAYAGES",
-        "improvements around each node (2); in a plane of the whole: one is the best",
+        "improvements (2): from the second on with smaller cells where much is left",
         Arg("n", ENTIER),
         name="sweeps",
     ),

@@ -24,10 +24,11 @@ from gibiane_ops.kernels.contact.node_pairs import node_pairs
 from gibiane_ops.kernels.elasticity import element_stiffness, strains, stresses
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotConverged
-from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stress, equilibrium_residual
+from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stress
 from gibiane_ops.kernels.estimate.bodies import loose_motions
 from gibiane_ops.kernels.estimate.contact_bound import contact_tractions
-from gibiane_ops.kernels.estimate.joints import Joined, Joint
+from gibiane_ops.kernels.estimate.equilibrium import equilibrium_residual
+from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.kernels.estimate.pieces import balanced_stress, uniform_aim
 from gibiane_ops.kernels.estimate.simplices import simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
@@ -181,10 +182,10 @@ def test_bonded_blocks(side, h):
     assert found.residual < 1e-10
     start, once, twice = effectivity(of, found, BONDED[side])
     assert 1 <= twice < once < start
-    # The edge of the small punch is singular, and its load travels far: measured 1.24 and 1.19 at 12.5 mm, 1.27 and
-    # 1.22 at 8.33 mm (theta is known to 2 %): from star to star loads travel less far on finer meshes.
-    assert once <= 1.5
-    assert twice <= 1.25
+    # The edge of the small punch is singular: measured 1.16 and 1.04 at 25 mm, 1.21 and 1.06 at 12.5 mm, 1.23 and 1.06
+    # at 8.33 mm (theta is known to 2 %), where the parts that are improved together are smaller than the mesh.
+    assert once <= 1.25
+    assert twice <= 1.1
     assert 4 * found.energy.sum() < BONDED[side] < 4 * (found.energy.sum() + found.total**2)
 
 
@@ -202,8 +203,8 @@ def test_blocks_without_friction(h):
     assert found.residual < 1e-10
     assert found.excess < 0
     _, once, twice = effectivity(of, found, FRICTIONLESS)
-    assert 1 <= twice < once <= 1.5
-    assert twice <= 1.25
+    assert 1 <= twice < once <= 1.3
+    assert twice <= 1.15
     # Pressures that stay those of the nodes keep the bound far from the error.
     if h < 20:
         fixed = of.estimate(u, of.with_contact(pressures), sweeps=1)
@@ -273,8 +274,8 @@ def assert_bounded(script, threshold, states, most):
     found = session.names()
     assert found["SURE"], out.getvalue()
     assert (found["BAS"], found["HAUT"]) == states
-    # Both meshes have about one theta: |u - u_h|^2 = |u_f - u_h|^2 + |u - u_f|^2, theta^2 = (EC^2 - EF^2) / EN.
-    assert 1 <= np.sqrt((found["EC"] ** 2 - found["EF"] ** 2) / found["EN"]) <= most
+    # |u - u_h|^2 = |u_f - u_h|^2 + |u - u_f|^2, and the last one is not below (EF / most)^2.
+    assert 1 <= found["EC"] / np.sqrt(found["EN"] + (found["EF"] / most) ** 2) <= most
 
 
 def test_slips_of_several_directions():
@@ -299,16 +300,15 @@ def test_slips_of_several_directions():
     # Tractions that differ on the two sides, or leave the bound, are seen.
     with pytest.raises(NotConverged):
         of.estimate(u, of.with_contact(replace(found, traction=1.01 * found.traction)), nodal=False)
-    joined = Joined(of.mesh, joint)
-    together = joined.taken(bound.tau)
-    assert joined.limits(together).excess(together) <= 1e-9
-    assert joined.limits(together).excess(1.03 * together) > 1e-6
+    assert bound.target.limits.excess(bound.tau) <= 1e-9
+    assert bound.target.limits.excess(1.03 * bound.tau) > 1e-6
     one_side = of.traction.copy()
     row = {tuple(nodes): i for i, nodes in enumerate(of.nodes)}
     for nodes, values in zip(of.slave, found.traction, strict=True):
         one_side[row[tuple(np.sort(nodes))]] += values[np.argsort(nodes)]
     loads = Exterior(one_side, of.free, np.zeros((len(of.cells), 3)))
-    assert equilibrium_residual(of.mesh, fixed.tau, loads) > 1e-3
+    once = of.estimate(u, of.with_contact(found), sweeps=1, nodal=False)
+    assert equilibrium_residual(of.mesh, once.tau, loads) > 1e-3
 
 
 SOLIDS = """

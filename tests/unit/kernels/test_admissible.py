@@ -1,5 +1,6 @@
 """Equilibrated stresses: exactness, equilibrium (and what breaks it), the identity of Prager and Synge, effectivity."""
 
+from dataclasses import replace
 from functools import lru_cache
 from itertools import permutations
 
@@ -10,18 +11,17 @@ from gibiane_ops.kernels import assembly, elasticity, integrals, quadrature
 from gibiane_ops.kernels.arrays import strain_vector, stress_tensor
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotEquilibrated
-from gibiane_ops.kernels.estimate.admissible import (
-    admissible_stress,
-    equilibrium_residual,
-    errors,
-    plane_compliance,
-    stress_at_corners,
-)
+from gibiane_ops.kernels.estimate import regions as parts
+from gibiane_ops.kernels.estimate.admissible import admissible_stress, plane_compliance
+from gibiane_ops.kernels.estimate.equilibrium import equilibrium_residual, stress_at_corners
+from gibiane_ops.kernels.estimate.improve import improve
 from gibiane_ops.kernels.estimate.macro import STATIC, contraction, macro_element
-from gibiane_ops.kernels.estimate.pieces import aim_of, balanced_stress, cut
-from gibiane_ops.kernels.estimate.simplices import Simplices, colours, simplices
-from gibiane_ops.kernels.estimate.stars import Improver
+from gibiane_ops.kernels.estimate.pieces import aim_of, balanced_stress, cut, uniform_aim
+from gibiane_ops.kernels.estimate.regions import regions
+from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
+from gibiane_ops.kernels.estimate.target import Target
 from gibiane_ops.kernels.estimate.tractions import Exterior, balanced_tractions
+from gibiane_ops.kernels.estimate.zoom import zoomed
 from gibiane_ops.kernels.geometry import facet_normals
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.solve import factorize
@@ -150,15 +150,6 @@ def test_macro_element_reproduces_uniform_stress(dim):
 
 
 @pytest.mark.parametrize("dim", [2, 3])
-def test_colours_share_no_cell_and_take_every_star_once(dim):
-    mesh = scene(dim, 3).mesh
-    sets = colours(mesh)
-    assert sorted(np.concatenate(sets)) == list(range(mesh.n_stars))
-    for stars in sets:
-        assert np.isin(mesh.star, stars).sum(axis=1).max() == 1
-
-
-@pytest.mark.parametrize("dim", [2, 3])
 def test_uniform_stress_has_no_error(dim):
     of = scene(dim, 3)
     s = np.array([2.0, -1.0, 0.5, 0.7, 0.3, -0.4]) if dim == 3 else np.array([2.0, -1.0, 0.3, 0.7])
@@ -177,7 +168,7 @@ def test_equilibrium_and_identity_on_a_quadratic_field(dim, n):
     found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=2)
     assert found.residual < 1e-12
     # |s_hat - s_h|^2 = |s - s_hat|^2 + |s - s_h|^2, each integrated exactly: all are linear in the parts of a cell.
-    mesh = found.mesh
+    mesh = found.target.mesh
     at = stress_at_corners(mesh, mesh.sign[..., None, None] * found.tau[mesh.side])
     X = mesh.points[mesh.cells]
     parts = np.repeat(X[:, None], dim + 1, axis=1)
@@ -192,52 +183,157 @@ def test_equilibrium_and_identity_on_a_quadratic_field(dim, n):
     assert energy(at - raw) == pytest.approx(found.error.sum(), rel=1e-10)
     assert energy(true - at) + energy(true - raw) == pytest.approx(energy(at - raw), rel=1e-10)
     theta = np.array(found.history) / np.sqrt(energy(true - raw))
-    assert (np.diff(theta) < 0).all()
-    assert 1 <= theta[-1] <= {2: 1.05, 3: 1.25}[dim]
-    assert theta[1] <= {2: 1.05, 3: 1.5}[dim]
+    # the exact stress, linear, is one of the stresses among which the least is found
+    assert theta[0] > 2
+    assert theta[1:] == pytest.approx(1.0, abs=1e-9)
 
 
-def test_whole_plane_is_the_least_of_all_sweeps():
-    of = scene(2, 6)
-    _, exterior, stress = quadratic(2, 6)
-    found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=1)
-    mesh = found.mesh
-    free = np.broadcast_to(np.eye(2), (len(mesh.nodes), 2, 2)).copy()
+def target_of(of: Scene, stress: np.ndarray, exterior: Exterior) -> tuple[Target, np.ndarray]:
+    """The stress as a target, and balanced tractions."""
+    mesh, dim, flat = of.mesh, of.dim, stress[:, STATIC[of.dim]]
+    free = np.broadcast_to(np.eye(dim), (len(mesh.nodes), dim, dim)).copy()
     free[mesh.boundary] = exterior.free
-    compliance = np.broadcast_to(of.compliance, (len(of.cells), 3, 3))
-    flat = stress[:, STATIC[2]]
+    given = np.zeros(free.shape)
+    given[mesh.boundary] = exterior.traction * of.area[:, None, None]
+    compliance = np.broadcast_to(of.compliance, (len(of.cells), *of.compliance.shape))
+    tau = balanced_tractions(mesh, flat, exterior)
+    cells = np.arange(len(of.cells))
+    return Target(mesh, uniform_aim(flat, dim), compliance, exterior.body, free, given, cells), tau
 
-    def after(tau: np.ndarray, sweeps: int) -> float:
-        improver = Improver(mesh, flat, compliance, free)
-        for _ in range(sweeps):
-            improver.sweep(tau)
-        return float(np.sqrt(errors(mesh, tau, flat, compliance).sum()))
 
-    # stars that start from it find nothing to gain; from the balanced tractions they come near, never below
-    assert after(found.tau.copy(), 2) == pytest.approx(found.total, rel=1e-9)
-    assert found.total < after(balanced_tractions(mesh, flat, exterior), 10) < 1.2 * found.total
+@pytest.mark.parametrize("dim", [2, 3])
+def test_improvement_finds_the_least_whatever_the_start(dim):
+    of = scene(dim, {2: 6, 3: 3}[dim])
+    _, exterior, stress = quadratic(dim, {2: 6, 3: 3}[dim])
+    target, tau = target_of(of, stress, exterior)
+    cells, other = np.arange(len(of.cells)), tau.copy()
+    # the least of another distance: balanced too, and far away
+    improve(replace(target, compliance=target.compliance * (1 + 50 * (cells % 3))[:, None, None]), other, cells)
+    improve(target, tau, cells)
+    assert target.residual(tau) < 1e-12
+    least = target.distance(tau).sum()
+    assert target.distance(other).sum() > 1.02 * least
+    improve(target, other, cells)
+    assert target.distance(other).sum() == pytest.approx(least, rel=1e-10)
+    assert np.abs(other - tau).max() < 1e-6 * np.abs(tau).max()
+
+
+def test_parts_of_a_mesh_come_near_the_whole(monkeypatch):
+    of = scene(3, 4)
+    exterior, stress = clamped(4)
+    target, tau = target_of(of, stress, exterior)
+    whole = tau.copy()
+    improve(target, whole, np.arange(len(of.cells)))
+    least = target.distance(whole).sum()
+    monkeypatch.setattr(parts, "WHOLE", 100)
+    monkeypatch.setattr(parts, "CORE", 60)
+    before = [target.distance(tau).sum()]
+    for turn in (0, 1):
+        cut = regions(of.mesh, turn)
+        assert len(cut) >= 6
+        assert np.isin(np.arange(len(of.cells)), np.concatenate(cut)).all()
+        for cells in cut:
+            improve(target, tau, cells)
+            before.append(target.distance(tau).sum())
+        assert target.residual(tau) < 1e-12
+    assert (np.diff(before) < 1e-12 * before[0]).all()
+    assert least < before[-1] < 1.2 * least
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_smaller_cells_keep_the_equilibrium(dim):
+    n = {2: 5, 3: 3}[dim]
+    of = scene(dim, n)
+    exact, exterior, stress = quadratic(dim, n)
+    target, tau = target_of(of, stress, exterior)
+    marked = np.zeros(len(of.cells), bool)
+    marked[::9] = True
+    for _ in range(3):
+        target, tau, fresh = zoomed(target, tau, marked)
+        assert target.residual(tau) < 1e-12
+        marked = np.zeros(len(fresh), bool)
+        marked[np.flatnonzero(fresh)[::7]] = True
+    assert len(target.cell) > 1.5 * len(of.cells)
+    volume = np.bincount(target.cell, target.mesh.volume)
+    assert volume == pytest.approx(of.mesh.volume, rel=1e-12)
+    # what is imposed is that of the first mesh: linear on each of its sides
+    mesh = target.mesh
+    X = mesh.points[mesh.nodes[mesh.boundary]]
+    normal = mesh.outward[mesh.cell[mesh.boundary, 0], mesh.local[mesh.boundary, 0]]
+    force = np.einsum("kaij,kj->kai", stress_tensor(exact(X))[..., :dim, :dim], normal)
+    assert target.given[mesh.boundary] == pytest.approx(force, abs=1e-12 * np.abs(force).max())
+    improve(target, tau, np.arange(len(fresh)))
+    assert target.residual(tau) < 1e-12
+    # whatever breaks it is seen on the small cells too
+    small = np.flatnonzero((mesh.cell[:, 1] >= 0) & fresh[mesh.cell[:, 0]])[3]
+    wrong = tau.copy()
+    wrong[small] *= -1
+    assert target.residual(wrong) > 1e-4
+    wrong = tau.copy()
+    line = np.diff(mesh.points[mesh.nodes[small]], axis=0)[0]
+    couple = np.array([-line[1], line[0]]) if dim == 2 else np.cross(line, [0.3, 0.5, 0.7])
+    wrong[small, 0] += 1e-2 * couple
+    wrong[small, 1] -= 1e-2 * couple
+    assert target.residual(wrong) > 1e-5
+    assert replace(target, body=0 * target.body).residual(tau) > 1e-4
+    edge = mesh.boundary[fresh[mesh.cell[mesh.boundary, 0]]][0]
+    given = target.given.copy()
+    given[edge] *= 1.001
+    assert replace(target, given=given).residual(tau) > 1e-6
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_smaller_cells_hold_a_uniform_stress(dim):
+    of = scene(dim, 3)
+    s = np.array([2.0, -1.0, 0.5, 0.7, 0.3, -0.4]) if dim == 3 else np.array([2.0, -1.0, 0.3, 0.7])
+    traction = np.einsum("ij,kj->ki", stress_tensor(s)[:dim, :dim], of.normal)
+    exterior = Exterior(
+        np.repeat(traction[:, None], dim, axis=1), np.zeros((len(of.X), dim, dim)), np.zeros((len(of.cells), dim))
+    )
+    target, tau = target_of(of, np.tile(s, (len(of.cells), 1)), exterior)
+    marked = np.zeros(len(of.cells), bool)
+    marked[4] = True
+    target, tau, _ = zoomed(target, tau, marked)
+    assert target.distance(tau).sum() < 1e-24
+
+
+def test_smaller_cells_where_the_stress_is_singular():
+    # The edges of a clamped base; where nothing is singular the cells stay as they are.
+    of = scene(3, 4)
+    exterior, stress = clamped(4)
+    found = admissible_stress(of.points, of.cells, stress, of.law, exterior)
+    cut = np.flatnonzero(np.bincount(found.target.cell) > 1)
+    assert 0 < len(cut) < 0.3 * len(of.cells)
+    X = of.points[of.mesh.cells[cut]].mean(axis=1)
+    corner = np.maximum(np.abs(X[:, 0] - 0.5), np.abs(X[:, 1] - 0.5)) > 0.25
+    assert (corner & (X[:, 2] < 0.25)).mean() > 0.7
+    assert found.history[2] < 0.98 * found.history[1]
+    _, exterior, stress = quadratic(3, 3)
+    of = scene(3, 3)
+    found = admissible_stress(of.points, of.cells, stress, of.law, exterior)
+    assert len(found.target.cell) == len(of.cells)
 
 
 def test_broken_equilibrium_is_seen():
     of = scene(3, 3)
     _, exterior, stress = quadratic(3, 3)
     found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=0)
-    assert equilibrium_residual(found.mesh, found.tau, exterior) < 1e-12
-    inner = np.flatnonzero(found.mesh.cell[:, 1] >= 0)[5]
+    assert equilibrium_residual(found.target.mesh, found.tau, exterior) < 1e-12
+    inner = np.flatnonzero(found.target.mesh.cell[:, 1] >= 0)[5]
     wrong = found.tau.copy()
     wrong[inner] *= -1
-    assert equilibrium_residual(found.mesh, wrong, exterior) > 1e-3
+    assert equilibrium_residual(found.target.mesh, wrong, exterior) > 1e-3
     # No resultant force, but a moment: a couple of tractions across the line between two corners.
     wrong = found.tau.copy()
-    along = of.points[found.mesh.nodes[inner]]
+    along = of.points[found.target.mesh.nodes[inner]]
     across = np.cross(along[1] - along[0], [0.3, 0.5, 0.7])
     wrong[inner, 0] += 1e-3 * across
     wrong[inner, 1] -= 1e-3 * across
-    assert equilibrium_residual(found.mesh, wrong, exterior) > 1e-5
+    assert equilibrium_residual(found.target.mesh, wrong, exterior) > 1e-5
     weightless = Exterior(exterior.traction, exterior.free, 0 * exterior.body)
-    assert equilibrium_residual(found.mesh, found.tau, weightless) > 1e-3
+    assert equilibrium_residual(found.target.mesh, found.tau, weightless) > 1e-3
     shifted = Exterior(exterior.traction + 0.01, exterior.free, exterior.body)
-    assert equilibrium_residual(found.mesh, found.tau, shifted) > 1e-5
+    assert equilibrium_residual(found.target.mesh, found.tau, shifted) > 1e-5
 
 
 def test_broken_equilibrium_of_the_whole_plane_is_seen():
@@ -245,17 +341,17 @@ def test_broken_equilibrium_of_the_whole_plane_is_seen():
     _, exterior, stress = quadratic(2, 4)
     found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=1)
     assert found.residual < 1e-12
-    inner = np.flatnonzero(found.mesh.cell[:, 1] >= 0)[5]
+    inner = np.flatnonzero(found.target.mesh.cell[:, 1] >= 0)[5]
     wrong = found.tau.copy()
     wrong[inner] *= -1
-    assert equilibrium_residual(found.mesh, wrong, exterior) > 1e-3
+    assert equilibrium_residual(found.target.mesh, wrong, exterior) > 1e-3
     # No resultant force, but a moment.
     wrong = found.tau.copy()
-    line = np.diff(of.points[found.mesh.nodes[inner]], axis=0)[0]
+    line = np.diff(of.points[found.target.mesh.nodes[inner]], axis=0)[0]
     wrong[inner] += 1e-3 * np.outer([1, -1], [-line[1], line[0]])
-    assert equilibrium_residual(found.mesh, wrong, exterior) > 1e-5
+    assert equilibrium_residual(found.target.mesh, wrong, exterior) > 1e-5
     weightless = Exterior(exterior.traction, exterior.free, 0 * exterior.body)
-    assert equilibrium_residual(found.mesh, found.tau, weightless) > 1e-3
+    assert equilibrium_residual(found.target.mesh, found.tau, weightless) > 1e-3
 
 
 def test_stress_of_other_loads_is_refused():
@@ -280,10 +376,9 @@ def test_effectivity_on_a_clamped_cube(n):
     found = admissible_stress(of.points, of.cells, stress, of.law, exterior, sweeps=3)
     assert found.residual < 1e-12
     theta = np.array(found.history) / np.sqrt(CLAMPED - found.energy.sum())
-    assert (np.diff(theta) < 0).all()
-    assert theta[3] >= 1
-    assert theta[1] <= 1.5
-    assert theta[2] <= 1.25
+    assert theta[0] > theta[1] > theta[2] >= theta[3] >= 1
+    assert theta[1] <= 1.15
+    assert theta[2] <= 1.1
     # Bounds of the energy from both sides.
     assert found.energy.sum() <= CLAMPED <= found.energy.sum() + found.total**2
 
@@ -309,9 +404,9 @@ def test_rollers_under_a_varying_pressure():
     stress = of.solve(loads, held, np.zeros(3))[1]
     found = admissible_stress(of.points, of.cells, stress, of.law, loads, sweeps=2)
     assert found.residual < 1e-12
-    assert found.history[0] > found.history[1] > found.history[2] > 0
+    assert found.history[0] > found.history[1] >= found.history[2] > 0
     sides = np.flatnonzero((np.abs(of.X[:, :, 0]) < 1e-9).all(axis=1))
-    assert np.abs(found.tau[found.mesh.boundary[sides]][..., 1:]).max() < 1e-14
+    assert np.abs(found.tau[found.target.mesh.boundary[sides]][..., 1:]).max() < 1e-14
 
 
 def test_two_materials_and_plane_strain():
@@ -331,7 +426,7 @@ def test_two_materials_and_plane_strain():
     found = admissible_stress(of.points, of.cells, stress, law, exterior, sweeps=2)
     assert found.residual < 1e-12
     assert found.energy.sum() == pytest.approx(
-        (found.mesh.volume * np.einsum("mi,mij,mj->m", stress, np.linalg.inv(law), stress)).sum(), rel=1e-12
+        (of.mesh.volume * np.einsum("mi,mij,mj->m", stress, np.linalg.inv(law), stress)).sum(), rel=1e-12
     )
 
 

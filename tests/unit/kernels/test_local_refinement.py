@@ -8,11 +8,12 @@ import scipy.sparse as sp
 from hanging_relations import relation_matrix
 
 from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, topology
-from gibiane_ops.kernels.adapt import bisection, hanging, hierarchy, octree
+from gibiane_ops.kernels.adapt import halvings, hanging, hierarchy, octree
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.materials import isotropic
+from gibiane_ops.kernels.mesh import bisection
 
 NAMES = {("simplex", 2): "TRI3", ("simplex", 3): "TET4", ("tensor", 2): "QUA4", ("tensor", 3): "CUB8"}
 FAMILY = {2: "DEFO", 3: "TRID"}
@@ -88,10 +89,10 @@ def test_halved_simplices_fill_the_domain_and_no_node_hangs(dim):
 def test_halvings_undone_give_the_first_mesh_back(dim):
     points, cells = simplices(3, dim)
     mesh = bisection.started(points, cells)
-    fine = bisection.adapted(mesh, 0.05 + 0.3 * np.linalg.norm(points, axis=1))
-    fine = bisection.adapted(fine, 0.03 + 0.2 * np.linalg.norm(fine.points, axis=1))
+    fine = halvings.adapted(mesh, 0.05 + 0.3 * np.linalg.norm(points, axis=1))
+    fine = halvings.adapted(fine, 0.03 + 0.2 * np.linalg.norm(fine.points, axis=1))
     assert len(fine.leaves) > 2 * len(cells)
-    coarse = bisection.adapted(fine, np.full(len(fine.points), 0.6))
+    coarse = halvings.adapted(fine, np.full(len(fine.points), 0.6))
     assert np.array_equal(coarse.leaf_cells, cells)
     assert np.array_equal(coarse.points, points)
 

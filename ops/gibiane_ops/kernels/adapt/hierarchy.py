@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gibiane_ops.kernels import geometry, topology
-from gibiane_ops.kernels.adapt import bisection, octree
-from gibiane_ops.kernels.adapt.bisection import Bisection
+from gibiane_ops.kernels.adapt import halvings, octree
 from gibiane_ops.kernels.adapt.octree import Octree
 from gibiane_ops.kernels.adapt.sizes import element_sizes, predicted_count
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
-from gibiane_ops.kernels.mesh import pairing
+from gibiane_ops.kernels.mesh import bisection, pairing
+from gibiane_ops.kernels.mesh.bisection import Bisection
 
 TRIALS = 6
 """Factors on the sizes that are tried to come near the number of elements asked."""
@@ -291,4 +291,4 @@ def _count(tree: Bisection | Octree) -> int:
 
 
 def _resized(tree: Bisection | Octree, sizes: FloatArray) -> Bisection | Octree:
-    return bisection.adapted(tree, sizes) if isinstance(tree, Bisection) else octree.resized(tree, sizes)[0]
+    return halvings.adapted(tree, sizes) if isinstance(tree, Bisection) else octree.resized(tree, sizes)[0]

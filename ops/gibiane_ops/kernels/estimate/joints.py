@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.limits import KEPT, Limits
 from gibiane_ops.kernels.estimate.macro import moments
-from gibiane_ops.kernels.estimate.simplices import Simplices, others, simplices, slots
+from gibiane_ops.kernels.estimate.simplices import Simplices, oriented, others, simplices, slots
+from gibiane_ops.kernels.estimate.target import Target
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +68,7 @@ class Joined:
         merged = joint.name[mesh.cells]
         self.order = np.argsort(merged, axis=1)
         cells = np.take_along_axis(merged, self.order, axis=1)
-        X = mesh.points[cells]
-        inverted = np.linalg.det(X[:, 1:] - X[:, :1]) < 0
-        cells[inverted, :2] = cells[inverted, 1::-1]
-        self.mesh = simplices(mesh.points, cells)
+        self.mesh = simplices(mesh.points, oriented(mesh.points, cells))
         self.separate = mesh
         inner = self.mesh.cell[:, 1] >= 0
         was_boundary = mesh.cell[self._old(self.mesh.cell[:, 0], self.mesh.local[:, 0])[0], 1] < 0
@@ -102,22 +100,49 @@ class Joined:
         corners = self.order[cell[:, None], others(dim)[local]]
         return self.separate.side[cell, face], slots(dim)[face[:, None], corners]
 
-    def taken(self, tau: FloatArray) -> FloatArray:
-        """Carry tractions of the separate mesh over, (n_sides, d, d)."""
-        cell, local = self.mesh.cell[:, 0], self.mesh.local[:, 0]
-        side, places = self._old(cell, local)
-        sign = self.separate.sign[cell, self.order[cell, local]]
-        return np.asarray(tau[side[:, None], places] * sign[:, None, None], np.float64)
+    def target(self, separate: Target, tau: FloatArray) -> tuple[Target, FloatArray]:
+        """Carry a target of the separate mesh and its tractions over.
 
-    def given_back(self, tau: FloatArray) -> FloatArray:
-        """Carry tractions back: opposite ones on the two sides of contact facets."""
-        found = np.empty((len(self.separate.nodes), *tau.shape[1:]))
-        for half, sign in ((1, -1.0), (0, 1.0)):
-            rows = np.flatnonzero(self.mesh.cell[:, half] >= 0)
-            cell, local = self.mesh.cell[rows, half], self.mesh.local[rows, half]
-            side, places = self._old(cell, local)
-            own = self.separate.sign[cell, self.order[cell, local]]
-            found[side[:, None], places] = tau[rows] * (sign * own)[:, None, None]
+        Parameters
+        ----------
+        separate : Target
+            Contact tractions are given there, opposite on both sides.
+        tau : (n_sides, d, d) float64, force
+
+        Returns
+        -------
+        target : Target
+            Contact tractions are free within the law.
+        tau : (n_sides, d, d) float64, force
+        """
+        together = self.taken(tau)
+        limits = self.limits(together)
+        aim = separate.aim
+        facet = np.full(len(self.mesh.nodes), -1)
+        facet[self.sides] = self.facet
+        # where the two sides differ the mean is none of them: the residual shows it
+        given = self.taken(separate.given)
+        given[self.crossed] = (given[self.crossed] + self.taken(separate.given, 1)[self.crossed]) / 2
+        found = replace(
+            separate,
+            mesh=self.mesh,
+            aim=replace(aim, pull=self.turned(aim.pull)),
+            free=self.free(separate.free),
+            given=given,
+            limits=limits,
+            facet=facet,
+        )
+        square = float(found.distance(together).sum())
+        return replace(found, limits=limits.spending(square) if self.mesh.dim == 3 else limits), together
+
+    def taken(self, tau: FloatArray, half: int = 0) -> FloatArray:
+        """Carry tractions of the separate mesh over, (n_sides, d, d), from the first cells or the second ones."""
+        found = np.zeros((len(self.mesh.nodes), *tau.shape[1:]))
+        rows = np.flatnonzero(self.mesh.cell[:, half] >= 0)
+        cell, local = self.mesh.cell[rows, half], self.mesh.local[rows, half]
+        side, places = self._old(cell, local)
+        sign = self.separate.sign[cell, self.order[cell, local]] * (-1.0 if half else 1.0)
+        found[rows] = tau[side[:, None], places] * sign[:, None, None]
         return found
 
     def turned(self, pull: FloatArray) -> FloatArray:
@@ -129,11 +154,6 @@ class Joined:
         values = pull.reshape(m, dim + 1, dim, dim)[np.repeat(np.arange(m), dim + 1), face]
         places = slots(dim)[face[:, None], corners]
         return np.asarray(np.take_along_axis(values, places[:, :, None], axis=1).reshape(m, -1), np.float64)
-
-    def separate_sides(self) -> IntArray:
-        """Return the sides of the separate mesh that are in contact with free pressures, those of both bodies."""
-        found = [self._old(self.mesh.cell[self.sides, half], self.mesh.local[self.sides, half])[0] for half in (0, 1)]
-        return np.concatenate(found)
 
     def free(self, separate: FloatArray) -> FloatArray:
         """Return the projectors on the directions free on each side, given those of the separate mesh."""

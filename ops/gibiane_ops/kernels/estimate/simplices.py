@@ -143,6 +143,14 @@ def simplices(points: FloatArray, cells: IntArray) -> Simplices:
     )
 
 
+def oriented(points: FloatArray, cells: IntArray) -> IntArray:
+    """Swap two nodes of the cells that are inside out, (m, d + 1)."""
+    X, found = points[cells], cells.copy()
+    wrong = np.linalg.det(X[:, 1:] - X[:, :1]) < 0
+    found[wrong, :2] = cells[wrong, 1::-1]
+    return found
+
+
 def _stars(dim: int, m: int, owner: IntArray, local: IntArray) -> tuple[IntArray, int]:
     """Find the sets of corners linked by sides, (m, dim + 1)."""
     from scipy.sparse.csgraph import connected_components
@@ -154,49 +162,3 @@ def _stars(dim: int, m: int, owner: IntArray, local: IntArray) -> tuple[IntArray
     links = sp.csr_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(size, size))
     n_stars, star = connected_components(links, directed=False)
     return star.reshape(m, dim + 1).astype(np.int64), int(n_stars)
-
-
-def colours(mesh: Simplices) -> list[IntArray]:
-    """Split the stars into sets in which no two share a cell.
-
-    Parameters
-    ----------
-    mesh : Simplices
-
-    Returns
-    -------
-    list of (k,) int64
-        Stars of each colour.
-
-    Notes
-    -----
-    Each colour is a maximal independent set of the stars left, built in rounds that keep the stars whose fixed random
-    rank is the highest among their neighbours.
-
-    Source
-    ------
-    Luby 1986; Jones and Plassmann 1993.
-    """
-    m, n = mesh.cells.shape
-    incidence = sp.csr_array(
-        (np.ones(m * n, np.int8), (mesh.star.ravel(), np.repeat(np.arange(m), n))), shape=(mesh.n_stars, m)
-    )
-    graph = sp.coo_array(incidence.astype(np.int32) @ incidence.T.astype(np.int32))
-    a, b = graph.coords
-    a, b = a[a != b], b[a != b]
-    rank = np.random.default_rng(0).permutation(mesh.n_stars)
-    left = np.ones(mesh.n_stars, bool)
-    found = []
-    while left.any():
-        candidate, chosen = left.copy(), np.zeros(mesh.n_stars, bool)
-        while candidate.any():
-            live = candidate[a] & candidate[b]
-            beaten = np.zeros(mesh.n_stars, bool)
-            beaten[a[live & (rank[a] < rank[b])]] = True
-            fresh = candidate & ~beaten
-            chosen |= fresh
-            candidate &= beaten
-            candidate[b[fresh[a]]] = False
-        found.append(np.flatnonzero(chosen))
-        left &= ~chosen
-    return found

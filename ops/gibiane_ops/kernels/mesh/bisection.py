@@ -8,8 +8,6 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels import geometry
-from gibiane_ops.kernels.adapt.sizes import element_sizes
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 
@@ -261,49 +259,3 @@ def coarsened(mesh: Bisection, willing: BoolArray) -> tuple[Bisection, IntArray]
         ends=np.where(ends >= 0, number[ends], -1),
     )
     return undone, np.flatnonzero(~gone)
-
-
-def adapted(mesh: Bisection, sizes: FloatArray) -> Bisection:
-    """Coarsen and refine until simplices have the sizes asked for, within the factor that one halving leaves.
-
-    Parameters
-    ----------
-    mesh : Bisection
-    sizes : (n,) float64, length
-        Edge of the regular simplex wanted at each node; a new node takes the mean of the ends of its edge.
-
-    Returns
-    -------
-    Bisection
-
-    Notes
-    -----
-    A halving divides the size by ``2^(1/dim)``: a simplex is halved above ``2^(1/(2 dim))`` times the size asked and
-    may become whole below its inverse.
-
-    Cost
-    ----
-    One sort of the edges per halving of the smallest simplices.
-    """
-    dim = mesh.points.shape[1]
-    of = shape(NAMES[dim + 1])
-    slack = 2 ** (1 / (2 * dim))
-    asked = sizes
-
-    def ratios(state: Bisection) -> FloatArray:
-        cells = state.leaf_cells
-        present = element_sizes(of, np.abs(geometry.measures(of, state.points[cells])))
-        return np.asarray(present / np.exp(np.log(asked[cells]).mean(axis=1)), np.float64)
-
-    while True:
-        mesh, kept = coarsened(mesh, ratios(mesh) <= 1 / slack)
-        if len(kept) == len(asked):
-            break
-        asked = asked[kept]
-    while True:
-        marked = ratios(mesh) > slack
-        if not marked.any():
-            return mesh
-        mesh = refined(mesh, marked)
-        new = mesh.ends[len(asked) :]
-        asked = np.concatenate([asked, np.sqrt(asked[new[:, 0]] * asked[new[:, 1]])])
