@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.bodies import loose_motions
 from gibiane_ops.kernels.estimate.contact_bound import VIOLATION, ContactTractions, contact_tractions
+from gibiane_ops.kernels.estimate.cutting import CORNERS
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
@@ -33,7 +34,7 @@ from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import solid_zones
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
-from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, exact_pieces, pieces_of
+from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, doubts_of, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
@@ -100,9 +101,11 @@ def _bound_with_contact(
             hint="mesh the contact surface once and copy it for the other solid; ERREUR 'CONTACT' without 'RDC' "
             "estimates the error on any meshes",
         )
-    pieces = pieces_of(ctx, zones, np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)]))
+    pairs = np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)])
+    pieces = pieces_of(ctx, zones, pairs, CORNERS)
     check_balance(ctx, pieces, stress, outside, volu, cl, [each for s in states for each in _forces(s)])
-    sides = [cut_sides(ctx, pieces, outside)]
+    boundary, same = cut_sides(ctx, pieces, outside)
+    sides = [boundary]
     blocks = [(z.shape, z.cells) for z in zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
@@ -125,7 +128,7 @@ def _bound_with_contact(
         facets += facet_zones(ctx, state, each, zones[0].mode)
     if solid.excess > VIOLATION:
         doubts.append(_unlawful(solid.excess))
-    cutting = exact_pieces(ctx, pieces, outside)
+    cutting = doubts_of(ctx, pieces, same)
     doubts += [cutting] if cutting else []
     guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
     more: dict[str, Any] = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
@@ -156,9 +159,12 @@ def _tractions(
             at="mc",
             shape=wrong,
         )
-    cuts = [(b.cells, *pieces.facets(b.cells)) for b in state.zone.slave.blocks]
-    cells = np.concatenate([np.take_along_axis(c[owner], places, axis=1) for c, places, owner in cuts])
     slave, master = state.pairs.pairs.T
+    lost = sum(int((~np.isin(b.cells, pieces.nodes)).any(axis=1).sum()) for b in state.zone.slave.blocks)
+    if lost:
+        _lost(ctx, lost)
+    cuts = [(b.cells, *pieces.facets(b.shape, b.cells)) for b in state.zone.slave.blocks]
+    cells = np.concatenate([each for _, each, _, _ in cuts])
     known = held_directions(store, supports, DISPLACEMENT[:dim], dim)
     # A support holds an axis of both nodes of a pair; an obstacle (-1) needs no balance of its own.
     sure = np.diagonal(held_at(*known, slave), axis1=1, axis2=2) > 1 - ROUND_OFF
@@ -167,9 +173,9 @@ def _tractions(
     threshold = nodal_property(ctx, values, "SEUI", slave) if state.zone.law == "TRESCA" else None
     with worded(ctx, at="mc"):
         found = contact_tractions(
-            store.coords[:, :dim],
+            pieces.cutting.points,
             cells,
-            slave,
+            pieces.places(slave),
             state.frames,
             state.force,
             state.relative,
@@ -180,19 +186,24 @@ def _tractions(
             _motions(ctx, state, pieces, supports),
         )
     lost = len(cells) - add_tractions(sides, name, cells, found.traction)
-    facing = partners(ctx, state)[cells]
+    facing = partners(ctx, state)[pieces.nodes[pieces.cutting.node[cells]]]
     both = (facing >= 0).all(axis=1)
-    lost += int(both.sum()) - add_tractions(sides, name, facing[both], -found.traction[both])
+    there = pieces.places(facing[both])
+    lost += len(there) - add_tractions(sides, name, there, -found.traction[both])
     if lost:
-        ctx.fail(
-            251,
-            "{count} contact facets have no facet of a solid with the same nodes: tractions cannot be opposite there",
-            at="mc",
-            count=lost,
-            hint="mesh the contact surface once, copy it for the other solid, and cut both alike",
-        )
-    parts = np.split(2 * found.facet, np.cumsum([len(owner) for _, _, owner in cuts])[:-1])
-    return found, [np.bincount(o, p, len(c)).astype(np.float64) for (c, _, o), p in zip(cuts, parts, strict=True)]
+        _lost(ctx, lost)
+    parts = np.split(2 * found.facet, np.cumsum([len(owner) for *_, owner in cuts])[:-1])
+    return found, [np.bincount(o, p, len(c)).astype(np.float64) for (c, *_, o), p in zip(cuts, parts, strict=True)]
+
+
+def _lost(ctx: Context, count: int) -> NoReturn:
+    ctx.fail(
+        251,
+        "{count} contact facets have no facet of a solid with the same nodes: tractions cannot be opposite there",
+        at="mc",
+        count=count,
+        hint="mesh the contact surface once, copy it for the other solid, and cut both alike",
+    )
 
 
 def _motions(ctx: Context, state: SolvedContact, pieces: Pieces, supports: Rigidite | None) -> FloatArray:
@@ -223,30 +234,29 @@ def _joint(
     pressures. Also tells which contact error of `squares`, and which of its facets, each facet of the joint is part of.
     """
     dim = pieces.zones[0].dim
-    points = node_store(ctx).coords[pieces.nodes][:, :dim]
-    name, parts = np.arange(len(pieces.nodes)), Parts()
+    points = pieces.cutting.points
+    name, parts = np.arange(len(points)), Parts()
     facets, bounds, slips = [np.zeros((0, dim), np.int64)], [np.zeros((0, dim))], [np.zeros((0, dim, dim))]
     for state, own in zip(states, squares, strict=True):
         if state.zone.law not in ("UNILATERAL", "TRESCA"):
             continue
         slave, master = state.pairs.pairs.T
         there = np.flatnonzero(master >= 0)
-        one, two = (np.searchsorted(pieces.nodes, side[there]) for side in (slave, master))
+        one, two = (pieces.places(side[there]) for side in (slave, master))
         open_by = np.abs(state.relative[there, 0] - state.gap[there])
         size = float(np.ptp(points, axis=0).max())
         shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[there, 0] < 0)
         shut &= np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size
         name[one[shut]] = two[shut]
-        closed, bound = np.zeros(len(pieces.nodes), bool), np.full(len(pieces.nodes), np.inf)
-        slip = np.zeros((len(pieces.nodes), dim))
+        closed, bound = np.zeros(len(points), bool), np.full(len(points), np.inf)
+        slip = np.zeros((len(points), dim))
         closed[one[shut]] = True
         threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave[there])
         if state.zone.law == "TRESCA" and threshold is not None:
             bound[one] = threshold
             slip[one] = np.einsum("nij,ni->nj", state.frames[there, 1:], state.relative[there, 1:])
         for block, square in zip(state.zone.slave.blocks, own, strict=True):
-            places, owner = pieces.facets(block.cells)
-            cells = np.searchsorted(pieces.nodes, np.take_along_axis(block.cells[owner], places, axis=1))
+            cells, _, owner = pieces.facets(block.shape, block.cells)
             kept = closed[cells].all(axis=1)
             cells = cells[kept]
             facets.append(name[cells])

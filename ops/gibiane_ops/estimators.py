@@ -27,7 +27,7 @@ from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_compliance, on_zone, solid_zones
 from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import node_store
-from gibiane_ops.values.pieces import cut_sides, exact_pieces, pieces_of
+from gibiane_ops.values.pieces import cut_sides, doubts_of, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
@@ -36,7 +36,7 @@ RESIDUALS = Guarantee(False, "explicit residuals follow the error up to a factor
 
 @ERRE.form(
     Key("RDC", "constitutive relation error", required=True),
-    Arg("model", MMODEL, "model of linear elements in space or in a plane; other elements than simplices are cut"),
+    Arg("model", MMODEL, "model in space or in a plane; other elements than linear simplices are cut"),
     Arg("sig", MCHAML, "stress"),
     Arg("mat", MCHAML, "material"),
     *LOADS,
@@ -73,8 +73,9 @@ def _constitutive_relation(
     sides = exterior(ctx, zones, cl, pres, fsur)
     pieces = pieces_of(ctx, zones)
     check_balance(ctx, pieces, stress, sides, volu, cl)
-    found = equilibrated(ctx, pieces, stress, material, cut_sides(ctx, pieces, sides), volu, sweeps, cl)
-    guarantee = guarantee_of(ctx, found, exact_pieces(ctx, pieces, sides))
+    boundary, same = cut_sides(ctx, pieces, sides)
+    found = equilibrated(ctx, pieces, stress, material, boundary, volu, sweeps, cl)
+    guarantee = guarantee_of(ctx, found, doubts_of(ctx, pieces, same))
     more: dict[str, Any] = {"EQUILIBRE": found.residual, "HISTOIRE": ListReel(found.history)}
     more |= energy_bounds(found)
     return results(ctx, parts_of(pieces, found), kind, norm, tabl, guarantee, refe, more)

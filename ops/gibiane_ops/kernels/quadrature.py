@@ -218,7 +218,7 @@ def pyramid(n: int = 2) -> Rule:
     ------
     Stroud 1971, conical product rules.
     """
-    heights, layer = _towards_apex(n)
+    heights, layer = _towards_apex(n, 2)
     base = square(n)
     points = np.vstack([np.c_[base.points * (1 - z), np.full(n * n, z)] for z in heights])
     return Rule(points, np.outer(layer, base.weights).ravel(), 2 * n - 1, "Stroud 1971, conical product")
@@ -244,11 +244,39 @@ def pyramid_5() -> Rule:
     return Rule(points, np.full(5, 4 / 15), 2, "moments up to degree 2")
 
 
-def _towards_apex(n: int) -> tuple[FloatArray, FloatArray]:
-    """Return points and weights on [0, 1] for the weight (1 - z)^2 (Golub-Welsch, Jacobi polynomials P^(2, 0))."""
+@cache
+def simplex(dim: int, n: int) -> Rule:
+    """Return the conical product rule of n^dim points on the reference triangle or tetrahedron.
+
+    Parameters
+    ----------
+    dim : {2, 3}
+    n : int
+        Points per axis.
+
+    Returns
+    -------
+    Rule
+        Of degree 2n - 1; all points inside, all weights positive.
+
+    Source
+    ------
+    Stroud 1971, conical product rules.
+    """
+    x, w = np.polynomial.legendre.leggauss(n)
+    points, weights = (1 + x)[:, None] / 2, w / 2
+    for k in range(1, dim):
+        heights, layer = _towards_apex(n, k)
+        points = np.vstack([np.c_[points * (1 - z), np.full(len(points), z)] for z in heights])
+        weights = np.outer(layer, weights).ravel()
+    return Rule(points, weights, 2 * n - 1, "Stroud 1971, conical product")
+
+
+def _towards_apex(n: int, a: int) -> tuple[FloatArray, FloatArray]:
+    """Return points and weights on [0, 1] for the weight (1 - z)^a (Golub-Welsch, Jacobi polynomials P^(a, 0))."""
     k = np.arange(n, dtype=np.float64)
-    diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
+    diagonal = -(a**2) / ((2 * k + a) * (2 * k + a + 2))
     k = k[1:]
-    beside = np.sqrt(4 * k * (k + 2) * k * (k + 2) / ((2 * k + 2) ** 2 * (2 * k + 3) * (2 * k + 1)))
+    beside = np.sqrt(4 * k * (k + a) * k * (k + a) / ((2 * k + a) ** 2 * (2 * k + a + 1) * (2 * k + a - 1)))
     x, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
-    return (1 + x) / 2, vectors[0] ** 2 / 3
+    return (1 + x) / 2, vectors[0] ** 2 / (a + 1)

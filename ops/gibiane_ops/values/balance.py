@@ -10,7 +10,7 @@ from gibiane.registry import Context
 from gibiane_ops.kernels import elasticity, geometry, integrals, recovery
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.supports import moved
-from gibiane_ops.kernels.topology import places_in, used_nodes
+from gibiane_ops.kernels.topology import middles_on_linear, places_in, used_nodes
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.exterior import Side, held_at, held_directions
 from gibiane_ops.values.maillage import Point
@@ -55,6 +55,10 @@ def unbalanced(
         np.add.at(force, places, side.forces(store.coords[:, :dim], axisymmetric=axis))
     for where, values in contact:
         np.add.at(force, np.searchsorted(nodes, where), values)
+    # middle nodes beside linear elements follow their ends, which carry their forces
+    for a, b, middle in places_in(nodes, middles_on_linear([(z.shape, z.cells) for z in zones])):
+        force[[a, b]] += force[middle] / 2
+        force[middle] = 0.0
     known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
     force -= np.einsum("nij,nj->ni", held_at(known, held, nodes), force)
     size = np.linalg.norm(force, axis=1)

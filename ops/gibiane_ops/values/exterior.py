@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -191,25 +190,25 @@ def held_directions(
     known, inverse = np.unique(np.concatenate(nodes), return_inverse=True)
     total = np.zeros((len(known) + 1, dim, dim))
     np.add.at(total, inverse, np.concatenate(matrices))
-    return known, _projectors(total, total.max(axis=(1, 2)) > 0)
+    return known, projectors(total)
 
 
-def _projectors(matrices: FloatArray, wanted: Any) -> FloatArray:
-    """Return the projectors on the ranges of symmetric matrices; zero for those that are not wanted."""
+def projectors(matrices: FloatArray) -> FloatArray:
+    """Return the projectors on the ranges of symmetric matrices without negative values, (k, d, d)."""
     values, vectors = np.linalg.eigh(matrices)
-    kept = np.where((values > 1e-9) & wanted[:, None], 1.0, 0.0)
+    kept = np.where(values > 1e-9, 1.0, 0.0)
     return np.asarray(np.einsum("kiv,kv,kjv->kij", vectors, kept, vectors), np.float64)
 
 
-def held_at(known: IntArray, projectors: FloatArray, nodes: IntArray) -> FloatArray:
+def held_at(known: IntArray, held: FloatArray, nodes: IntArray) -> FloatArray:
     """Return the projectors on the directions held at given nodes, (..., d, d), see `held_directions`."""
     padded = np.append(known, -1)
     place = np.searchsorted(known, nodes)
     found = np.where(padded[place] == nodes, place, len(known))
-    return np.asarray(projectors[found], np.float64)
+    return np.asarray(held[found], np.float64)
 
 
-def _common(known: IntArray, projectors: FloatArray, nodes: IntArray) -> FloatArray:
+def _common(known: IntArray, held: FloatArray, nodes: IntArray) -> FloatArray:
     """Return the projectors on the directions held at all the nodes of each facet, (k, d, d)."""
-    left = (np.eye(projectors.shape[1]) - held_at(known, projectors, nodes)).sum(axis=1)
-    return np.asarray(np.eye(left.shape[1]) - _projectors(left, np.ones(len(left), bool)), np.float64)
+    left = (np.eye(held.shape[1]) - held_at(known, held, nodes)).sum(axis=1)
+    return np.asarray(np.eye(left.shape[1]) - projectors(left), np.float64)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane.registry import Context
-from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.estimate.pieces import cut
+from gibiane_ops.kernels.estimate.cutting import CENTRES, CORNERS, MIDDLES, Cutting
+from gibiane_ops.kernels.estimate.sides import Parts
 from gibiane_ops.kernels.topology import Facets
 from gibiane_ops.values.exterior import Side
 from gibiane_ops.values.modele import ModelZone
-from gibiane_ops.values.nodes import IntArray, node_store
+from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
 ROUND_OFF = 1e-9
 SIMPLICES = ("TRI3", "TET4")
@@ -30,55 +30,48 @@ class Pieces:
         Nodes of the session, sorted.
     cells : list of (m, n_nodes) int64
         Elements of each zone, nodes numbered in `nodes`.
-    rank : (n,) int64
-        Order of the nodes: facets with four nodes are cut from the lowest.
-    corners : list of (k, d + 1) int64
-        Corners of its element that each simplex takes.
-    owner : list of (k,) int64
-        Element of each simplex.
+    cutting : Cutting
+        Of these elements.
     """
 
     zones: list[ModelZone]
     nodes: IntArray
     cells: list[IntArray]
-    rank: IntArray
-    corners: list[IntArray]
-    owner: list[IntArray]
+    cutting: Cutting
 
     @property
     def whole(self) -> bool:
-        """Whether no element was cut."""
-        return all(z.shape in SIMPLICES for z in self.zones)
+        """Whether no element was cut, and stresses are uniform."""
+        return self.cutting.finest < MIDDLES and all(z.shape in SIMPLICES for z in self.zones)
 
-    def facets(self, nodes: IntArray) -> tuple[IntArray, IntArray]:
-        """Cut facets of nodes of the session into simplices: places of their nodes, (k, d), and the facet of each."""
-        if nodes.shape[1] < 4:
-            return np.tile(np.arange(nodes.shape[1]), (len(nodes), 1)), np.arange(len(nodes))
-        return cut("QUA4", nodes, _ranks(self.nodes, self.rank, nodes))
+    def places(self, nodes: IntArray) -> IntArray:
+        """Return the points of the simplices that nodes of the session are."""
+        return self.cutting.places(np.searchsorted(self.nodes, nodes))
 
-
-def _ranks(nodes: IntArray, rank: IntArray, used: IntArray) -> IntArray:
-    """Return the rank of each node of the session, up to the largest that is used."""
-    full = np.zeros(int(max(nodes.max(initial=0), used.max(initial=0))) + 1, np.int64)
-    full[nodes] = rank
-    return full
+    def facets(self, name: str, nodes: IntArray) -> tuple[IntArray, FloatArray, IntArray]:
+        """Cut facets of nodes of the session, see `Cutting.facets`."""
+        return self.cutting.facets(name, np.searchsorted(self.nodes, nodes))
 
 
-def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = None) -> Pieces:
-    """Cut the elements of a model into simplices; facets of `pairs` of nodes, (k, 2), are cut alike on both sides."""
+def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = None, finest: int | None = None) -> Pieces:
+    """Cut the elements of a model into simplices; facets of `pairs` of nodes, (k, 2), are cut alike on both sides.
+
+    Quadratic elements are cut through the middles of their edges, so that the stress on the simplices, linear in parts,
+    follows theirs; quadrangles from their centres.
+    """
     dim = zones[0].dim
-    wanted = ("TRI3", "QUA4") if dim == 2 else ("TET4", "PYR5", "PRI6", "CUB8")
-    wrong = next((z for z in zones if z.shape not in wanted or z.axisymmetric), None)
+    wrong = next((z for z in zones if z.axisymmetric or z.bars or shape(z.shape).dim != dim), None)
     if wrong is not None:
         ctx.fail(
             251,
-            "an equilibrated stress is built on {wanted} only, not on {shape} in mode {mode}",
+            "an equilibrated stress is built on solids in space or in a plane, not on {shape} in mode {mode}",
             at="model",
-            wanted=" ".join(wanted),
-            shape=wrong.shape,
+            shape="BARR" if wrong.bars else wrong.shape,
             mode=wrong.mode,
-            hint="solve on linear elements before the estimate",
+            hint="ERREUR with 'SPR' estimates the error there, without a bound",
         )
+    if finest is None:
+        finest = MIDDLES if any(shape(z.shape).degree > 1 for z in zones) else CENTRES if dim == 2 else CORNERS
     nodes, flat = np.unique(np.concatenate([z.cells.ravel() for z in zones]), return_inverse=True)
     cells = [
         part.reshape(z.cells.shape)
@@ -90,43 +83,61 @@ def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = Non
         lead[np.searchsorted(nodes, known[:, 1])] = known[:, 0]
     rank = np.empty(len(nodes), np.int64)
     rank[np.lexsort((nodes, lead))] = np.arange(len(nodes))
-    cuts = [cut(z.shape, c, rank) for z, c in zip(zones, cells, strict=True)]
-    return Pieces(zones, nodes, cells, rank, [c for c, _ in cuts], [o for _, o in cuts])
+    points = node_store(ctx).coords[nodes][:, :dim]
+    cutting = Cutting(points, [(z.shape, c) for z, c in zip(zones, cells, strict=True)], rank, finest)
+    return Pieces(zones, nodes, cells, cutting)
 
 
-def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side]) -> Side:
-    """Return the boundary as one set of simplicial facets, loads and supports carried over."""
+def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side]) -> tuple[Side, bool]:
+    """Return the boundary as one set of sides of the simplices, and whether their linear tractions are those given.
+
+    Nodes of the result are points of the simplices. Tractions have on each side the moments of those given, which
+    keeps their resultants: they are the same where these are linear.
+    """
     dim = pieces.zones[0].dim
-    parts = []
+    name, points = "SEG2" if dim == 2 else "TRI3", node_store(ctx).coords[:, :dim]
+    parts, same = [], True
     for side in sides:
-        places, owner = pieces.facets(side.facets.nodes)
-        rows = np.arange(len(owner))[:, None]
-        parts.append(
-            (
-                side.facets.nodes[owner][rows, places],
-                side.facets.cell[owner],
-                side.traction[owner][rows, places],
-                side.free[owner],
-            )
-        )
-    nodes, cell, traction, free = (np.concatenate(each) for each in zip(*parts, strict=True))
-    name = "SEG2" if dim == 2 else "TRI3"
-    return Side(Facets(name, nodes, cell, np.zeros(len(nodes), np.int64)), traction, free)
+        of = shape(side.facets.name)
+        sides_of, at, owner = pieces.facets(of.name, side.facets.nodes)
+        traction = side.traction[owner]
+        if of.name == name and pieces.cutting.finest < MIDDLES:
+            # as given, to the last digit
+            given = np.einsum("kan,kni->kai", of.N(at.reshape(-1, dim - 1)).reshape(*at.shape[:2], -1), traction)
+        else:
+            X, corners = points[side.facets.nodes[owner]], pieces.cutting.points[sides_of]
+            given, left = Parts(of, X, at, corners).linear(traction)
+            same = same and left.max(initial=0.0) <= ROUND_OFF * float(np.abs(side.traction).max(initial=0.0))
+        parts.append((sides_of, side.facets.cell[owner], given, side.free[owner]))
+    nodes, cell, values, free = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Side(Facets(name, nodes, cell, np.zeros(len(nodes), np.int64)), values, free), same
 
 
-def exact_pieces(ctx: Context, pieces: Pieces, sides: list[Side]) -> str:
-    """Say why the pieces of elements are not exactly the elements and their loads; nothing when they are."""
+def doubts_of(ctx: Context, pieces: Pieces, same: bool) -> str:
+    """Say why the simplices are not exactly the elements and their loads; nothing when they are."""
     points = node_store(ctx).coords[pieces.nodes][:, : pieces.zones[0].dim]
     for zone, cells in zip(pieces.zones, pieces.cells, strict=True):
         of, X = shape(zone.shape), points[cells]
-        if zone.shape in SIMPLICES:
-            continue
-        J = geometry.jacobians(of, X, of.gauss[0])
-        if zone.shape not in ("QUA4", "CUB8") or np.abs(J - J[:, :1]).max() > ROUND_OFF * np.abs(J).max():
-            return "the elements are not parallelepipeds: their stress on the simplices is not exact"
-    for side in sides:
-        if side.traction.shape[1] == 4:
-            twist = side.traction[:, 0] - side.traction[:, 1] + side.traction[:, 2] - side.traction[:, 3]
-            if np.abs(twist).max(initial=0.0) > ROUND_OFF * np.abs(side.traction).max(initial=0.0):
-                return "a load varies more than linearly over a facet"
+        size = np.abs(X - X[:, :1]).max(axis=(1, 2))
+        for a, b, *middle in of.edges:
+            if middle and _off_chord(X[:, a], X[:, b], X[:, middle[0]], size):
+                return "sides of elements are curved: the stress in equilibrium stands on their chords"
+        for kind, corners in of.faces:
+            if shape(kind).n_corners == 4 and not _plane(X[:, list(corners[:4])], size):
+                return "faces of elements are not plane: those of the stress in equilibrium are cut into triangles"
+    if not same:
+        return "a load varies more than linearly over the facets of the stress in equilibrium"
     return ""
+
+
+def _off_chord(a: FloatArray, b: FloatArray, middle: FloatArray, size: FloatArray) -> bool:
+    """Tell whether a middle node is not on the line between the ends of its edge."""
+    along = b - a
+    share = ((middle - a) * along).sum(axis=1) / (along**2).sum(axis=1)
+    return bool((np.abs(middle - a - share[:, None] * along).max(axis=1) > ROUND_OFF * size).any())
+
+
+def _plane(X: FloatArray, size: FloatArray) -> bool:
+    """Tell whether four corners, (m, 4, 3), lie in a plane."""
+    volume = np.abs(np.linalg.det(X[:, 1:] - X[:, :1]))
+    return bool((volume <= ROUND_OFF * size**3).all())

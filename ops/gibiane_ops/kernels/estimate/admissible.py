@@ -54,6 +54,8 @@ class Admissible:
         within the law.
     contact : (k,) float64, energy
         What the improved tractions change in the squared contact error, by facet of the joint.
+    remainder : float, energy
+        What the integration of stresses that are no polynomials may have left, see `pieces.Aim`: part of `error`.
     """
 
     target: Target
@@ -65,6 +67,7 @@ class Admissible:
     residual: float
     excess: float = 0.0
     contact: FloatArray = field(default_factory=lambda: np.zeros(0))
+    remainder: float = 0.0
 
     @property
     def total(self) -> float:
@@ -204,6 +207,7 @@ def admissible_stress(
         max(residual, target.residual(tau)),
         0.0 if target.limits is None else target.limits.excess(tau),
         2 * (target.work(tau, facets) - start),
+        float(target.remainder(tau).sum()),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.limits import KEPT, Limits
 from gibiane_ops.kernels.estimate.macro import moments
+from gibiane_ops.kernels.estimate.pieces import Aim
 from gibiane_ops.kernels.estimate.simplices import Simplices, oriented, others, simplices, slots
 from gibiane_ops.kernels.estimate.target import Target
 
@@ -117,7 +118,6 @@ class Joined:
         """
         together = self.taken(tau)
         limits = self.limits(together)
-        aim = separate.aim
         facet = np.full(len(self.mesh.nodes), -1)
         facet[self.sides] = self.facet
         # where the two sides differ the mean is none of them: the residual shows it
@@ -126,7 +126,7 @@ class Joined:
         found = replace(
             separate,
             mesh=self.mesh,
-            aim=replace(aim, pull=self.turned(aim.pull)),
+            aim=self._turned_aim(separate.aim),
             free=self.free(separate.free),
             given=given,
             limits=limits,
@@ -134,6 +134,10 @@ class Joined:
         )
         square = float(found.distance(together).sum())
         return replace(found, limits=limits.spending(square) if self.mesh.dim == 3 else limits), together
+
+    def _turned_aim(self, aim: Aim) -> Aim:
+        check = None if aim.check is None else self._turned_aim(aim.check)
+        return replace(aim, pull=self.turned(aim.pull), check=check)
 
     def taken(self, tau: FloatArray, half: int = 0) -> FloatArray:
         """Carry tractions of the separate mesh over, (n_sides, d, d), from the first cells or the second ones."""

@@ -1,4 +1,4 @@
-"""Stresses of bricks and quadrangles on the simplices that they are cut into, for stresses in equilibrium."""
+"""Finite-element stresses on the simplices that elements are cut into, and what balances them there."""
 
 from __future__ import annotations
 
@@ -10,16 +10,18 @@ import scipy.sparse as sp
 
 from gibiane_ops.kernels import assembly, elasticity, quadrature
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
-from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotConverged
+from gibiane_ops.kernels.estimate.fields import Field
 from gibiane_ops.kernels.estimate.macro import macro_element, moments, turned
 from gibiane_ops.kernels.estimate.simplices import Simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
-from gibiane_ops.kernels.mesh.simplices import tetrahedra, triangles_of_quadrangles
+from gibiane_ops.kernels.quadrature import Rule
 from gibiane_ops.kernels.solve import factorize
 
-CHUNK = 2048
+CHUNK = 200_000
+"""Points at which strains are evaluated together."""
+
 SHIFT = 1e-9
 """Diagonal added to the stiffness, over its own, so that bodies held by contact alone have a factor; corrected away."""
 
@@ -42,11 +44,14 @@ class Aim:
         ``int s_hat : D^-1 : (sigma_h - mean)`` as a linear form of the tractions, in the order of `macro.MacroElement`.
     constant : (k,) float64, energy
         ``int (sigma_h - mean) : D^-1 : (sigma_h - mean)``.
+    check : Aim, optional
+        The same by a coarser rule, where the stress is no polynomial: their difference tells what integration leaves.
     """
 
     mean: FloatArray
     pull: FloatArray
     constant: FloatArray
+    check: Aim | None = None
 
 
 def uniform_aim(stress: FloatArray, dim: int) -> Aim:
@@ -54,46 +59,32 @@ def uniform_aim(stress: FloatArray, dim: int) -> Aim:
     return Aim(stress, np.zeros((len(stress), macro_element(dim).n_tractions)), np.zeros(len(stress)))
 
 
-def cut(name: str, cells: IntArray, rank: IntArray) -> tuple[IntArray, IntArray]:
-    """Cut elements of first degree into simplices.
-
-    Parameters
-    ----------
-    name : str
-    cells : (m, n_nodes) int64
-    rank : (n_points,) int64
-        Order of the nodes: each quadrangular face is cut from its node of lowest rank.
-
-    Returns
-    -------
-    corners : (k, d + 1) int64
-        Corners of the element that each simplex takes.
-    owner : (k,) int64
-    """
-    local = rank[cells]
-    if name == "QUA4":
-        pieces, owner = triangles_of_quadrangles(local), np.repeat(np.arange(len(cells)), 2)
-    elif name == "TRI3":
-        pieces, owner = local, np.arange(len(cells))
-    else:
-        pieces, owner = tetrahedra(name, local)
-    return (local[owner][:, None, :] == pieces[:, :, None]).argmax(axis=2), owner
+def joined_aims(parts: list[Aim]) -> Aim:
+    """Put aims one after the other; those that need no check are their own."""
+    mean, pull, constant = (
+        np.concatenate(each) for each in zip(*[(a.mean, a.pull, a.constant) for a in parts], strict=True)
+    )
+    if all(a.check is None for a in parts):
+        return Aim(mean, pull, constant)
+    return Aim(
+        mean, pull, constant, joined_aims([Aim(b.mean, b.pull, b.constant) for b in (a.check or a for a in parts)])
+    )
 
 
-def aim_of(of: Shape, mesh_map: FloatArray, nodal: FloatArray, corners: IntArray, compliance: FloatArray) -> Aim:
+def aim_of(field: Field, owner: IntArray, at: FloatArray, corners: FloatArray, compliance: FloatArray) -> Aim:
     """Describe the stress of elements on their simplices.
 
     Parameters
     ----------
-    of : Shape
-        Of the elements.
-    mesh_map : (k, d, d) float64, length
-        Maps of the simplices, their corners in the order of `corners`.
-    nodal : (k, n_nodes, n_s) float64
-        Stress at the nodes of the element of each simplex, interpolated in between.
-    corners : (k, d + 1) int64
-        Corners of the element that each simplex takes.
+    field : Field
+    owner : (k,) int64
+        Element of each simplex.
+    at : (k, d + 1, d) float64
+        Reference coordinates of the corners of the simplices.
+    corners : (k, d + 1, d) float64, length
+        These corners, in the order of the mesh of simplices.
     compliance : (k, n_s, n_s) float64
+        Uniform in each simplex.
 
     Returns
     -------
@@ -101,27 +92,53 @@ def aim_of(of: Shape, mesh_map: FloatArray, nodal: FloatArray, corners: IntArray
 
     Notes
     -----
-    Exact on parallelograms and parallelepipeds, where the stress is of second degree in the simplices.
+    Exact where the maps of the elements are affine: the stress is of degree one (TRI6, TE10, QUA4, PRI6), two (QUA8,
+    CUB8, PR15) or three (CU20) in the simplices. Elsewhere it is rational, and a coarser rule tells how well a finer
+    one integrates it.
     """
-    dim = mesh_map.shape[1]
-    n, macro = dim + 1, macro_element(dim)
-    rule = quadrature.triangle(4) if dim == 2 else quadrature.tetrahedron(5)
+    bent = ~field.affine[owner]
+    exact, first, second = _rules(field)
+    found = _integrated(field, owner, at, corners, compliance, exact if not bent.any() else first)
+    if not bent.any():
+        return found
+    check = Aim(found.mean.copy(), found.pull.copy(), found.constant.copy())
+    again = _integrated(field, owner[bent], at[bent], corners[bent], compliance[bent], second)
+    check.mean[bent], check.pull[bent], check.constant[bent] = again.mean, again.pull, again.constant
+    return Aim(found.mean, found.pull, found.constant, check)
+
+
+def _rules(field: Field) -> tuple[Rule, Rule, Rule]:
+    """Return a rule that is exact in elements of affine map, and two for the others, the finer one first."""
+    dim, linear = field.of.dim, field.of.degree == 1
+    if dim == 2:
+        return quadrature.triangle(4), quadrature.simplex(2, 5), quadrature.simplex(2, 4)
+    if field.of.name == "CU20":
+        return quadrature.simplex(3, 4), quadrature.simplex(3, 5), quadrature.simplex(3, 4)
+    table = quadrature.tetrahedron(5)
+    return table, quadrature.simplex(3, 4 if linear else 5), table if linear else quadrature.simplex(3, 4)
+
+
+def _integrated(
+    field: Field, owner: IntArray, at: FloatArray, corners: FloatArray, compliance: FloatArray, rule: Rule
+) -> Aim:
+    """Integrate over each part of each macro-element."""
+    n, dim, n_s = corners.shape[1], corners.shape[2], compliance.shape[1]
+    macro = macro_element(dim)
     inside = shape("TRI3" if dim == 2 else "TET4").N(rule.points)
     weight = rule.weights * factorial(dim) / n
-    found = Aim(
-        np.empty((len(corners), nodal.shape[2])), np.empty((len(corners), macro.n_tractions)), np.empty(len(corners))
-    )
+    found = Aim(np.empty((len(owner), n_s)), np.empty((len(owner), macro.n_tractions)), np.empty(len(owner)))
     parts = np.repeat(np.eye(n)[None], n, axis=0)
     parts[range(n), range(n)] = 1.0 / n
-    bary = np.einsum("qp,kpc->kqc", inside, parts)
-    for start in range(0, len(corners), CHUNK):
-        some = slice(start, start + CHUNK)
-        xi = np.einsum("kqc,mcd->mkqd", bary, of.ref_nodes[corners[some]])
-        N = of.N(xi.reshape(-1, xi.shape[-1])).reshape(*xi.shape[:3], -1)
-        values = np.einsum("mkqn,mns->mkqs", N, nodal[some], optimize=True)
+    bary = np.einsum("qp,kpc->kqc", inside, parts).reshape(-1, n)
+    law = np.linalg.inv(compliance)
+    step = max(CHUNK // len(bary), 1)
+    for start in range(0, len(owner), step):
+        some = slice(start, start + step)
+        strain = field.strains(owner[some], bary @ corners[some], bary @ at[some])
+        values = np.matmul(strain, law[some]).reshape(-1, n, len(rule.weights), n_s)
         mean = np.einsum("q,mkqs->ms", weight, values)
         values = values - mean[:, None, None]
-        F = mesh_map[some]
+        F = (corners[some, 1:] - corners[some, :1]).swapaxes(1, 2)
         det = np.abs(np.linalg.det(F))
         volume = det / factorial(dim)
         strain = np.matmul(values, compliance[some][:, None])

@@ -49,16 +49,25 @@ class Target:
     facet: IntArray | None = None
 
     def distance(self, tau: FloatArray, sign: float = 1.0) -> FloatArray:
-        """Integrate the energy of ``sigma_hat - sign sigma_h`` over each cell, (m,) float64.
+        """Integrate the energy of ``sigma_hat - sign sigma_h`` over each cell, (m,) float64, with what this may leave.
 
         Parameters
         ----------
         tau : (n_sides, d, d) float64, force
         sign : float
         """
-        sigma = sign * self.aim.mean
-        pulled = (self.aim.pull * jumps(self.mesh, tau, sigma).reshape(len(sigma), -1)).sum(axis=1)
-        found = errors(self.mesh, tau, sigma, self.compliance) - 2 * sign * pulled + self.aim.constant
+        return self._integral(self.aim, tau, sign) + self.remainder(tau, sign)
+
+    def remainder(self, tau: FloatArray, sign: float = 1.0) -> FloatArray:
+        """Return what integration may leave of the distance, (m,) float64: the difference of two rules."""
+        if self.aim.check is None:
+            return np.zeros(len(self.cell))
+        return np.abs(self._integral(self.aim, tau, sign) - self._integral(self.aim.check, tau, sign))
+
+    def _integral(self, aim: Aim, tau: FloatArray, sign: float) -> FloatArray:
+        sigma = sign * aim.mean
+        pulled = (aim.pull * jumps(self.mesh, tau, sigma).reshape(len(sigma), -1)).sum(axis=1)
+        found = errors(self.mesh, tau, sigma, self.compliance) - 2 * sign * pulled + aim.constant
         return np.asarray(np.maximum(found, 0.0), np.float64)
 
     def residual(self, tau: FloatArray) -> float:

@@ -1,0 +1,172 @@
+"""The stress of elements at any of their points, from its values at the integration points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gibiane_ops.kernels import elasticity, geometry
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.shape import Shape
+from gibiane_ops.kernels.errors import NotConverged
+from gibiane_ops.kernels.estimate.macro import PAIRS, STATIC
+
+AFFINE = 1e-9
+"""Largest change of the jacobian matrix of an element, over its size, for which its map counts as affine."""
+
+INVERSIONS, INVERTED = 50, 1e-13
+"""Largest number of Newton steps to a point of an element; distance left that is round-off, over its size."""
+
+RATIONAL = ("PYR5", "PY13")
+"""Elements whose shape functions are not polynomials."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Strains of the displacement of elements, each up to its rigid motion.
+
+    Attributes
+    ----------
+    of : Shape
+    X, U : (m, n_nodes, d) float64, length
+        Nodes, and displacements that have the strains.
+    affine : (m,) bool
+        Elements whose map is affine: strains are polynomials there.
+    misfit : float
+        Largest difference to the strains given, over the largest of them: round-off for those of a displacement.
+    """
+
+    of: Shape
+    X: FloatArray
+    U: FloatArray
+    affine: NDArray[np.bool_]
+    misfit: float
+
+    def strains(self, cells: IntArray, x: FloatArray, guess: FloatArray) -> FloatArray:
+        """Evaluate strains at points of elements.
+
+        Parameters
+        ----------
+        cells : (k,) int64
+            Elements.
+        x : (k, p, d) float64, length
+            Points of each; outside of the element its polynomials go on.
+        guess : (k, p, d) float64
+            Their reference coordinates, exact where the map is affine.
+
+        Returns
+        -------
+        (k, p, n_s) float64
+            Components of `macro.STATIC`, engineering shears.
+
+        Raises
+        ------
+        NotConverged
+            A point has no reference coordinates.
+        """
+        k, p, dim = x.shape
+        xi = guess.copy()
+        bent = np.flatnonzero(~self.affine[cells])
+        if len(bent):
+            xi[bent] = located(self.of, self.X[cells[bent]], x[bent], guess[bent])
+        slope = self.of.dN(xi.reshape(-1, dim)).reshape(k, p, -1, dim).swapaxes(1, 2).reshape(k, -1, p * dim)
+        both = np.concatenate([self.X[cells], self.U[cells]], axis=2).swapaxes(1, 2)
+        found = np.matmul(both, slope).reshape(k, 2, dim, p, dim)
+        J, H = (found[:, i].swapaxes(1, 2) for i in (0, 1))
+        gradient = np.matmul(H, np.linalg.inv(J))
+        pairs = PAIRS[dim]
+        return np.stack([gradient[..., i, j] + (gradient[..., j, i] if i != j else 0.0) for i, j in pairs], axis=-1)
+
+
+def located(of: Shape, X: FloatArray, x: FloatArray, guess: FloatArray) -> FloatArray:
+    """Find the reference coordinates of points of elements or facets by Newton's method.
+
+    Parameters
+    ----------
+    of : Shape
+    X : (k, n_nodes, d) float64, length
+    x : (k, p, d) float64, length
+        Points of each; those of a facet on it.
+    guess : (k, p, dim) float64
+
+    Returns
+    -------
+    (k, p, dim) float64
+
+    Raises
+    ------
+    NotConverged
+        A point has no reference coordinates.
+    """
+    k, p, _ = x.shape
+    X, xi = np.repeat(X, p, axis=0), guess.reshape(k * p, -1).copy()
+    x = x.reshape(k * p, -1)
+    size = np.abs(X - X[:, :1]).max(axis=(1, 2))
+    history: list[float] = []
+    rows = np.arange(len(x))
+    for _ in range(INVERSIONS):
+        left = x[rows] - np.einsum("kn,kni->ki", of.N(xi[rows]), X[rows])
+        far = np.abs(left).max(axis=1) > INVERTED * size[rows]
+        history.append(float((np.abs(left).max(axis=1) / size[rows]).max(initial=0.0)))
+        rows, left = rows[far], left[far]
+        if not len(rows):
+            return xi.reshape(k, p, -1)
+        J = np.einsum("kni,knj->kij", X[rows], of.dN(xi[rows]))
+        Jt = J.swapaxes(1, 2)
+        xi[rows] += np.linalg.solve(np.matmul(Jt, J), np.matmul(Jt, left[..., None]))[..., 0]
+    raise NotConverged(history, xi)
+
+
+def field_of(of: Shape, X: FloatArray, strain: FloatArray) -> Field:
+    """Find displacements of elements that have given strains.
+
+    Parameters
+    ----------
+    of : Shape
+        In a plane or in space.
+    X : (m, n_nodes, d) float64, length
+    strain : (m, q, n_s) float64
+        At the points of the stiffness rule, components of `macro.STATIC`.
+
+    Returns
+    -------
+    Field
+
+    Notes
+    -----
+    Least squares over the points; the points of a stiffness rule leave no displacement without strain but the rigid
+    motions, which are set to zero. So finite-element strains come back exactly, wherever they are not interpolated
+    exactly from these points: in distorted elements they are rational functions.
+
+    Cost
+    ----
+    One symmetric system of all the displacements of each element.
+    """
+    points, (m, n, dim) = of.gauss[0], X.shape
+    J = geometry.jacobians(of, X, points)
+    affine = np.abs(J - J[:, :1]).max(axis=(1, 2, 3)) <= AFFINE * np.abs(J).max(axis=(1, 2, 3))
+    if of.name in RATIONAL:
+        affine[:] = False
+    U, misfit, largest = np.empty(X.shape), 0.0, float(np.abs(strain).max(initial=0.0))
+    turns = [(i, j) for i in range(dim) for j in range(i)]
+    for start in range(0, m, elasticity.CHUNK):
+        some = slice(start, start + elasticity.CHUNK)
+        B = elasticity.strain_operator(of, X[some], points)[:, :, list(STATIC[dim])]
+        B = B.reshape(len(B), -1, n * dim)
+        arm = X[some] - X[some].mean(axis=1, keepdims=True)
+        scale = np.abs(arm).max(axis=(1, 2))
+        rigid = np.zeros((len(B), dim + len(turns), n, dim))
+        rigid[:, range(dim), :, range(dim)] = 1.0
+        for row, (i, j) in enumerate(turns, dim):
+            rigid[:, row, :, i], rigid[:, row, :, j] = -arm[..., j] / scale[:, None], arm[..., i] / scale[:, None]
+        rigid = rigid.reshape(len(B), -1, n * dim) / scale[:, None, None]
+        A = np.matmul(B.swapaxes(1, 2), B) + np.matmul(rigid.swapaxes(1, 2), rigid)
+        given = strain[some].reshape(len(B), -1, 1)
+        u = np.linalg.solve(A, np.matmul(B.swapaxes(1, 2), given))
+        # one more step, in strains that are left: the normal equations lose half of the digits
+        u = u + np.linalg.solve(A, np.matmul(B.swapaxes(1, 2), given - np.matmul(B, u)))
+        misfit = max(misfit, float(np.abs(given - np.matmul(B, u)).max(initial=0.0)))
+        U[some] = u[..., 0].reshape(-1, n, dim)
+    return Field(of, X, U, affine, misfit / largest if largest else 0.0)

@@ -1,0 +1,195 @@
+"""Equilibrated stresses on elements that are cut: fit, fields inside elements, the identity of Prager and Synge."""
+
+import numpy as np
+import pytest
+from boxes import cut, grid, mesh, with_middles
+
+from gibiane_ops.kernels import elasticity, geometry, quadrature
+from gibiane_ops.kernels.arrays import strain_vector, stress_tensor
+from gibiane_ops.kernels.elements.quadratic import LINEAR
+from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.estimate.admissible import admissible_stress, plane_compliance
+from gibiane_ops.kernels.estimate.cutting import CENTRES, CORNERS, MIDDLES, Cutting
+from gibiane_ops.kernels.estimate.equilibrium import stress_at_corners
+from gibiane_ops.kernels.estimate.fields import field_of
+from gibiane_ops.kernels.estimate.macro import STATIC
+from gibiane_ops.kernels.estimate.pieces import aim_of, balanced_stress
+from gibiane_ops.kernels.estimate.simplices import simplices
+from gibiane_ops.kernels.estimate.tractions import Exterior
+from gibiane_ops.kernels.materials import isotropic
+from gibiane_ops.kernels.quadrature import Rule
+from gibiane_ops.kernels.topology import boundary, group_by_nodes
+
+PLANE = ["TRI3", "QUA4", "TRI6", "QUA8"]
+SOLID = ["TET4", "PYR5", "PRI6", "CUB8", "TE10", "PY13", "PR15", "CU20"]
+
+
+def skewed(name, n, bend=0.25):
+    """The unit box in elements whose quadrangular faces are plane, yet not parallelograms."""
+    linear, dim = LINEAR.get(name, name), shape(name).dim
+    points, cells = cut(linear, *grid(*(n,) * dim, distortion=0.0))
+    points[:, :2] += bend / n * np.sin(np.pi * points[:, :2]) * np.cos(2.3 * points[:, 1::-1])
+    points[:, 0] *= 1 + bend * points[:, 1]
+    return with_middles(linear, points, cells) if name in LINEAR else (points, cells)
+
+
+def finest_of(name):
+    return [CORNERS, CENTRES, MIDDLES] if shape(name).dim == 2 else [CORNERS, CENTRES]
+
+
+@pytest.mark.parametrize("finest", [CORNERS, CENTRES, MIDDLES])
+@pytest.mark.parametrize("name", PLANE + SOLID)
+def test_pieces_fit_and_fill(name, finest):
+    points, cells = skewed(name, 2)
+    found = Cutting(points, [(name, cells)], np.random.default_rng(0).permutation(len(points)), finest)
+    pieces = simplices(found.points, found.cells)
+    measure = np.bincount(found.owner[0], pieces.volume)
+    assert measure == pytest.approx(geometry.measures(shape(name), points[cells]), rel=1e-12)
+    assert found.points[found.node >= 0] == pytest.approx(points[found.node[found.node >= 0]], abs=0)
+    # the boundary is that of the box, and facets are cut as their elements are
+    (*skin,) = boundary([(name, cells)]).items()
+    sides = []
+    for kind, facets in skin:
+        children, at, owner = found.facets(kind, facets.nodes)
+        N = shape(kind).N(at.reshape(-1, at.shape[2])).reshape(*at.shape[:2], -1)
+        where = np.einsum("kan,kni->kai", N, points[facets.nodes[owner]])
+        assert where == pytest.approx(found.points[children], abs=1e-12)
+        sides.append(children)
+    sides = np.concatenate(sides)
+    _, first = group_by_nodes(np.vstack([pieces.nodes[pieces.boundary], sides]))
+    assert len(first) == len(sides) == len(pieces.boundary)
+    # reference coordinates lead back to the points; those of pyramids do so to no more than the centre
+    inside = shape(name).N(found.at.reshape(-1, found.at.shape[2])).reshape(*found.at.shape[:2], -1)
+    assert np.einsum("kan,kni->kai", inside, points[cells[found.owner[0]]]) == pytest.approx(
+        found.points[found.cells], abs=1e-12
+    )
+
+
+def test_neighbours_of_both_degrees_fit():
+    points, cells = grid(4, 3)
+    left = points[cells].mean(axis=1)[:, 0] < 0.5
+    points, quadratic = with_middles("QUA4", points, cells[left])
+    found = Cutting(points, [("QUA8", quadratic), ("QUA4", cells[~left])], np.arange(len(points)), MIDDLES)
+    pieces = simplices(found.points, found.cells)
+    assert pieces.volume.sum() == pytest.approx(1.0)
+    X = found.points[pieces.nodes[pieces.boundary]]
+    assert ((np.abs(X) < 1e-9) | (np.abs(X - 1) < 1e-9)).all(axis=1).any(axis=1).all()
+
+
+def test_facets_of_another_mesh_are_refused():
+    points, cells = mesh("QUA8", 2, 2)
+    found = Cutting(points, [("QUA8", cells)], np.arange(len(points)), MIDDLES)
+    with pytest.raises(BadValue):
+        found.facets("SEG3", np.array([[0, 8, 9]]))
+
+
+def fine_rule(name):
+    """A rule of high degree for the element."""
+    match LINEAR.get(name, name):
+        case "QUA4":
+            return quadrature.square(9)
+        case "CUB8":
+            return quadrature.cube(8)
+        case "TRI3":
+            return quadrature.simplex(2, 6)
+        case "TET4":
+            return quadrature.simplex(3, 6)
+        case "PYR5":
+            return quadrature.pyramid(9)
+    flat, tall = quadrature.simplex(2, 7), quadrature.line(7)
+    points = np.hstack([np.tile(flat.points, (7, 1)), np.repeat(tall.points, len(flat.points), 0)])
+    return Rule(points, np.outer(tall.weights, flat.weights).ravel(), 7, "product")
+
+
+def curved(dim):
+    """A quadratic displacement, its gradient, the stress and the body force that balances it."""
+    A = np.random.default_rng(1).normal(size=(dim,) * 3)
+    A = A + A.swapaxes(1, 2)
+    law = isotropic(1.0, 0.3, "TRID" if dim == 3 else "DEFO")
+
+    def displacement(x):
+        return np.einsum("ijk,...j,...k->...i", A, x, x) / 2
+
+    def stress(x):
+        strain, gradient = np.zeros((*x.shape[:-1], 3, 3)), np.einsum("ijk,...k->...ij", A, x)
+        strain[..., :dim, :dim] = (gradient + gradient.swapaxes(-1, -2)) / 2
+        return strain_vector(strain, 6 if dim == 3 else 4) @ law
+
+    body = -sum(stress_tensor(stress(np.eye(dim)[k]))[:dim, k] for k in range(dim))
+    return law, displacement, stress, body
+
+
+@pytest.mark.parametrize("skew", [False, True])
+@pytest.mark.parametrize("name", PLANE + SOLID)
+def test_strains_come_back_at_any_point(name, skew):
+    of = shape(name)
+    points, cells = skewed(name, 2, 0.25 if skew else 0.0)
+    U = np.random.default_rng(3).normal(size=points.shape)
+    exact = elasticity.strains(of, points[cells], U[cells], of.gauss[0])[..., STATIC[of.dim]]
+    field = field_of(of, points[cells], exact)
+    assert field.misfit < 1e-10
+    xi = fine_rule(name).points[::5]
+    x = geometry.positions(of, points[cells], xi)
+    guess = np.where(field.affine[:, None, None], xi, 0.9 * xi + 0.1 * of.ref_nodes.mean(axis=0))
+    wanted = elasticity.strains(of, points[cells], U[cells], xi)[..., STATIC[of.dim]]
+    assert field.strains(np.arange(len(cells)), x, guess) == pytest.approx(wanted, abs=1e-8 * np.abs(wanted).max())
+    # values that are no strains of a displacement are seen, where there are more of them than freedoms
+    noise = np.random.default_rng(5).normal(size=exact.shape)
+    more = exact[0].size > points[cells][0].size - 3 * (of.dim - 1)
+    assert (field_of(of, points[cells], exact + noise).misfit > 1e-3) == more
+
+
+@pytest.mark.parametrize("skew", [False, True])
+@pytest.mark.parametrize(("name", "finest"), [(name, f) for name in PLANE + SOLID for f in finest_of(name)])
+def test_identity(name, finest, skew):
+    # Any admissible displacement will do: the exact one at the nodes, disturbed.
+    of, dim = shape(name), shape(name).dim
+    law, displacement, exact, body = curved(dim)
+    points, cells = skewed(
+        name, 1 if dim == 3 and (name.startswith("P") or of.degree > 1) else 2, 0.25 if skew else 0.0
+    )
+    U = displacement(points)
+    U = U + 0.05 * np.random.default_rng(2).normal(size=U.shape)
+    given = elasticity.strains(of, points[cells], U[cells], of.gauss[0])[..., STATIC[dim]]
+    cutting = Cutting(points, [(name, cells)], np.arange(len(points)), finest)
+    pieces = simplices(cutting.points, cutting.cells)
+    m = len(pieces.cells)
+    compliance = np.broadcast_to(plane_compliance(law, dim), (m, *[len(STATIC[dim])] * 2))
+    order = np.argsort(cutting.cells, axis=1)
+    field = field_of(of, points[cells], given)
+    aim = aim_of(
+        field, cutting.owner[0], np.take_along_axis(cutting.at, order[:, :, None], axis=1),
+        pieces.points[pieces.cells], compliance,
+    )  # fmt: skip
+    edge = pieces.boundary
+    outward = pieces.outward[pieces.cell[edge, 0], pieces.local[edge, 0]]
+    outward = outward / np.linalg.norm(outward, axis=1)[:, None]
+    X = pieces.points[pieces.nodes[edge]]
+    traction = np.einsum("kaij,kj->kai", stress_tensor(exact(X))[..., :dim, :dim], outward)
+    loads = Exterior(traction, np.zeros((len(edge), dim, dim)), np.tile(body, (m, 1)))
+    start, free = np.zeros((m, len(law))), np.zeros((len(pieces.points), dim, dim))
+    start[:, STATIC[dim]] = aim.mean
+    start = balanced_stress(pieces, start, np.broadcast_to(law, (m, *law.shape)), loads, free)
+    found = admissible_stress(cutting.points, cutting.cells, start, law, loads, sweeps=0, mesh=pieces, aim=aim)
+    assert found.residual < 1e-11
+    assert (found.remainder == 0) == bool(field.affine.all())
+
+    # |s_hat - s_h|^2 = |s - s_hat|^2 + |s - s_h|^2: the first is linear in parts, the second integrated over elements
+    at = stress_at_corners(pieces, pieces.sign[..., None, None] * found.tau[pieces.side])
+    corners = np.repeat(pieces.points[pieces.cells][:, None], dim + 1, axis=1)
+    corners[:, range(dim + 1), range(dim + 1)] = corners[:, 0].mean(axis=1, keepdims=True)
+    left = exact(corners)[..., STATIC[dim]] - at
+    mass = (np.eye(dim + 1) + 1) / ((dim + 1) * (dim + 2)) / (dim + 1)
+    hat = float(np.einsum("m,pq,mkps,st,mkqt->", pieces.volume, mass, left, compliance[0], left, optimize=True))
+    rule = fine_rule(name)
+    raw = elasticity.strains(of, points[cells], U[cells], rule.points) @ law
+    gap = (exact(geometry.positions(of, points[cells], rule.points)) - raw)[..., STATIC[dim]]
+    weight = geometry.point_measures(of, points[cells], (rule.points, rule.weights))
+    true = float(np.einsum("mq,mqs,st,mqt->", weight, gap, compliance[0], gap, optimize=True))
+    assert hat + true == pytest.approx(found.error.sum() - found.remainder, rel=1e-9, abs=1.01 * found.remainder)
+    assert min(hat, found.error.sum() - true) > 1e-3 * true
+    # the improvement goes on to be above the error, and falls
+    better = admissible_stress(cutting.points, cutting.cells, start, law, loads, sweeps=1, mesh=pieces, aim=aim)
+    assert better.residual < 1e-11
+    assert found.error.sum() > better.error.sum() >= (1 - 1e-12) * true
