@@ -39,7 +39,7 @@ LISSER = operator(
     "projection, with 'LUMP' on the lumped mass. To estimate the error of quadratic elements take 'SPR': 'MOYE' and "
     "'PROJ' stay so near to their stresses that the error seems several times smaller than it is. To read the stress "
     "at a point of the surface where it peaks, 'MOYE' is often the better. 'SPRE': patches that also look at "
-    "equilibrium with the loads given as to ERREUR 'RDC' (Wiberg 1994), linear elements; "
+    "equilibrium with the loads given as to ERREUR 'RDC' (Wiberg 1994); "
     "tractions that the stress does not balance (contact, forgotten loads) count as unknown. 'JOINT' MC: patches "
     "across a contact, which assume that all the components go through: for bonded solids of one material only. Each "
     "solid is smoothed alone, never across two materials or across a contact. The result is an element field of "
@@ -111,7 +111,7 @@ def _lisser(
 
 @LISSER.form(
     Key("SPRE", "patches that also look at equilibrium and at the tractions given", required=True),
-    Arg("model", MMODEL, "model of linear elements"),
+    Arg("model", MMODEL, "model"),
     Arg("stress", MCHAML, "stress"),
     Arg("material", MCHAML, "material: solids of different materials are told apart", optional=True),
     *LOADS,
@@ -132,16 +132,8 @@ def _with_equilibrium(
 ) -> Any:
     (stress,) = told_apart(ctx, [("stress", stress), ("material", material)], STRESS)
     zones = solid_zones(ctx, model)
-    wrong = next((z for z in zones if shape(z.shape).degree > 1 or z.axisymmetric or z.bars), None)
-    if wrong is not None:
-        ctx.fail(
-            251,
-            "patches with equilibrium are made on linear elements in space or a plane, not on {shape} in mode {mode}",
-            at="model",
-            shape=wrong.shape,
-            mode=wrong.mode,
-            hint="LISSER 'SPR' takes every element",
-        )
+    if any(z.bars for z in zones):
+        ctx.fail(251, "stresses of bars cannot be smoothed: a model of massive elements is wanted", at="model")
     known = known_tractions(ctx, zones, stress, exterior(ctx, zones, cl, pres, fsur), volu, cl)
     return _field(ctx, smoothed(ctx, model, stress, "SPR", balance=known), where)
 

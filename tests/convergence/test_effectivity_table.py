@@ -99,12 +99,20 @@ def test_quadratic_elements_want_patches(element):
         wanted, near = (SINGULAR[name], 0.05) if name in SINGULAR else (2.0, 0.25 if name == "hole" else 0.03)
         assert rate == pytest.approx(wanted, abs=near), name
         theta = fine["theta"]
+        assert list(theta) == [each for each in NAMES if each != "RDC"]
+        # residuals follow the error at its rate, whatever it is
+        assert theta["RESI"] == pytest.approx(coarse["theta"]["RESI"], rel=0.05)
         if name in SINGULAR:
-            assert theta["SPR"] == pytest.approx(coarse["theta"]["SPR"], abs=0.02)
-            assert 1 <= theta["SPR"] <= 1.25
+            for method in ("SPR", "SPRE"):
+                assert theta[method] == pytest.approx(coarse["theta"][method], abs=0.02)
+                assert 1 <= theta[method] <= 1.35
             continue
-        assert 0.8 <= theta["SPR"] <= 1.2
-        assert fine["SD"]["SPR"] <= 0.2
+        for method in ("SPR", "SPRE"):
+            assert 0.8 <= theta[method] <= 1.2
+            assert fine["SD"][method] <= 0.2
+        # what is known of the loads brings the patches nearer
+        assert abs(theta["SPRE"] - 1) <= abs(theta["SPR"] - 1) + 2e-3
+        assert 0.5 < theta["RESI"] < 1.5
         # nodal means and the projection stay near the stresses that they smooth, values of centres go far away
         assert max(theta["MOYE"], theta["PROJ"]) < 0.7
         assert theta["MOYC"] > 4
@@ -119,6 +127,10 @@ def test_estimates_in_space():
         if element in ("CU20", "TE10"):
             # coarse: 4 elements along the thickness of the tube, 1.6 and 1.8 there
             assert 1 <= theta["SPR"] <= 2
+            assert list(theta) == [each for each in NAMES if each != "RDC"]
+            # the tractions make up for the layers that are missing
+            assert abs(theta["SPRE"] - 1) < abs(theta["SPR"] - 1)
+            assert 0.5 < theta["RESI"] < 1.5
             assert max(theta["MOYE"], theta["PROJ"]) < (0.75 if name == "tube" else 0.9)
             continue
         assert list(theta) == list(NAMES)

@@ -81,11 +81,20 @@ def known_tractions(
     left, _ = unbalanced(ctx, zones, stress, sides, volu, supports)
     parts = []
     for side in sides:
-        X = points[side.facets.nodes]
-        normal = geometry.facet_normals(shape(side.facets.name), X)
+        of, X = shape(side.facets.name), points[side.facets.nodes]
+        xi = recovery.surface_points(of)
+        normal = geometry.normal_densities(of, X, xi)
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         known = np.eye(dim) - side.free
         known[np.isin(side.facets.nodes, left).any(axis=1)] = 0.0
-        parts.append((side.facets.cell, X.mean(axis=1), normal, side.traction.mean(axis=1), known))
+        each = (geometry.positions(of, X, xi), normal, np.matmul(of.N(xi), side.traction))
+        parts.append(
+            (
+                np.repeat(side.facets.cell, len(xi)),
+                *(values.reshape(-1, dim) for values in each),
+                np.repeat(known, len(xi), axis=0),
+            )
+        )
     surface = recovery.Surface(*(np.concatenate(each) for each in zip(*parts, strict=True)))
     if len(left):
         ctx.warn(

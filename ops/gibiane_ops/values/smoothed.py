@@ -73,7 +73,7 @@ class Balance:
             start += len(zone.cells)
         s = self.surface
         here = np.flatnonzero(place[s.cell] >= 0)
-        return recovery.Surface(place[s.cell[here]], s.centre[here], s.normal[here], s.traction[here], s.known[here])
+        return recovery.Surface(place[s.cell[here]], s.place[here], s.normal[here], s.traction[here], s.known[here])
 
 
 def solids_of(zones: list[ModelZone]) -> list[list[ModelZone]]:
@@ -135,7 +135,8 @@ def smoothed(
                 if balance is None:
                     found = recovery.recover(points, blocks, method, degree)
                 else:
-                    found = recovery.enriched_recovery(points, blocks, balance.body, balance.surface_of(zones))
+                    known, axis = balance.surface_of(zones), zones[0].axisymmetric
+                    found = recovery.enriched_recovery(points, blocks, balance.body, known, axisymmetric=axis)
             except NotConverged as failure:
                 ctx.fail(
                     997,

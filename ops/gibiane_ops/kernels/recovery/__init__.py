@@ -8,7 +8,7 @@ from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock, centre_v
 from gibiane_ops.kernels.recovery.enriched import Surface, enriched_recovery
 from gibiane_ops.kernels.recovery.methods import METHODS, recover
 from gibiane_ops.kernels.recovery.patches import patch_recovery
-from gibiane_ops.kernels.recovery.samples import superconvergent_samples
+from gibiane_ops.kernels.recovery.samples import superconvergent_samples, surface_points
 
 __all__ = [
     "METHODS",
@@ -25,4 +25,5 @@ __all__ = [
     "project",
     "recover",
     "superconvergent_samples",
+    "surface_points",
 ]

@@ -8,43 +8,48 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import topology
-from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
-from gibiane_ops.kernels.errors import BadValue
+from gibiane_ops.kernels.arrays import FloatArray, IntArray, component_of, stress_tensor
 from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock
-from gibiane_ops.kernels.recovery.fits import FLAT, Samples
-from gibiane_ops.kernels.recovery.patches import lending, patch_nodes
+from gibiane_ops.kernels.recovery.fits import Fits, Samples, ranges
+from gibiane_ops.kernels.recovery.orthonormal import Basis
+from gibiane_ops.kernels.recovery.patches import Patches, lower_to_elements
 from gibiane_ops.kernels.recovery.samples import superconvergent_samples
 
 BALANCE, SURFACE = 1.0, 1.0
-"""Weights of the equilibrium of a patch and of each facet of its surface; a sample has one."""
+"""Weights of the equilibrium at each sample and of each point of the surface; a sample has one."""
 
-CHUNK = 4096
+CHUNK = 256
+"""Patches, and points of the surface times 16, worked on at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """What is known on facets of the surface.
+    """What is known at points of the surface.
 
     Attributes
     ----------
     cell : (k,) int64
-        Cell of each facet, counted through the blocks.
-    centre, normal, traction : (k, d) float64
-        Middle, outward unit normal, imposed traction there.
+        Cell that each point is on, counted through the blocks.
+    place, normal, traction : (k, d) float64
+        Where, outward unit normal, imposed traction there.
     known : (k, d, d) float64
         Projector on the directions in which the traction is known.
     """
 
     cell: IntArray
-    centre: FloatArray
+    place: FloatArray
     normal: FloatArray
     traction: FloatArray
     known: FloatArray
 
 
 def enriched_recovery(
-    points: FloatArray, blocks: Sequence[StressBlock], body: FloatArray, surface: Surface
+    points: FloatArray,
+    blocks: Sequence[StressBlock],
+    body: FloatArray,
+    surface: Surface,
+    *,
+    axisymmetric: bool = False,
 ) -> Recovered:
     """Smooth by superconvergent patches with equilibrium and boundary tractions (SPRE).
 
@@ -52,25 +57,24 @@ def enriched_recovery(
     ----------
     points : (n_points, d) float64, length
     blocks : list of StressBlock
-        Linear elements of one solid.
+        Elements of one solid.
     body : (d,) float64, force / length^d
     surface : Surface
+        Middles of linear facets; some points of those of second degree.
+    axisymmetric : bool
+        Cells are sections of a body of revolution; zz is the hoop stress.
 
     Returns
     -------
     Recovered
 
-    Raises
-    ------
-    BadValue
-        Elements of second degree.
-
     Notes
     -----
-    In each patch all the components are linear together and minimise ``sum |s - s_h|^2`` over the superconvergent
-    points, plus ``r^2 |div s + f|^2`` for the mean radius r of the points, once for each of them, plus ``|s n - t|^2``
-    at the middle of each facet of the surface that its elements have. Patches stand about the corners inside and are
-    lent to the surface, as in `patches.patch_recovery`.
+    In each patch all the components are polynomials together, of the degree of the elements, and minimise
+    ``sum |s - s_h|^2 + r^2 |div s + f|^2`` over the superconvergent points, r their mean distance from the middle, plus
+    ``|s n - t|^2`` at the points of the surface that its elements have. Round an axis the divergence holds
+    ``(s_rr - s_tt) / r`` and ``s_rz / r``. Patches stand about the corners inside and are lent to the surface, and
+    curvatures that the samples do not determine are left out, as in `patches.patch_recovery`.
 
     Source
     ------
@@ -78,86 +82,90 @@ def enriched_recovery(
 
     Cost
     ----
-    One symmetric matrix of 24 unknowns a patch in space, 12 in a plane.
+    One symmetric matrix a patch: of 24 unknowns in space, 12 in a plane, with elements of second degree 60 and 24.
     """
-    if any(block.shape.degree > 1 for block in blocks):
-        raise BadValue("degree", 2, "1: patches with equilibrium are made for linear elements")
-    n_points, dim = points.shape
-    c = blocks[0].stress.shape[2]
-    mesh = [(block.shape.name, block.cells) for block in blocks]
-    used = topology.used_nodes([cells for _, cells in mesh])
-    inner, own = patch_nodes(mesh, used, n_points)
-    star = topology.node_to_cells(mesh, n_points)
-    samples = Samples.around(own, star, [superconvergent_samples(points, block) for block in blocks])
-    p = len(own)
-    count = np.bincount(samples.patch, minlength=p)
-    centre = _sums(samples.patch, samples.places, p) / count[:, None]
-    offset = samples.places - centre[samples.patch]
-    radius = np.sqrt(_sums(samples.patch, (offset**2).sum(axis=1, keepdims=True), p)[:, 0] / count / dim)
-    radius = np.where(radius > 0, radius, 1.0)
-    y = np.hstack([np.ones((len(offset), 1)), offset / radius[samples.patch, None]])
-    gram = _sums(samples.patch, (y[:, :, None] * y[:, None]).reshape(len(y), -1), p).reshape(p, dim + 1, dim + 1)
-    spread = np.linalg.eigvalsh(gram[:, 1:, 1:] / count[:, None, None] - _outer(gram[:, 0, 1:] / count[:, None]))
-    failed = spread[:, 0] <= FLAT * spread[:, -1]
-    right = _sums(samples.patch, (y[:, :, None] * samples.values[:, None]).reshape(len(y), -1), p).reshape(
-        p, dim + 1, c
-    )
+    (n_points, dim), c = points.shape, blocks[0].stress.shape[2]
+    patches = Patches.of([(block.shape.name, block.cells) for block in blocks], n_points)
+    highest = np.full(n_points, 2)
+    lower_to_elements(highest, blocks)
+    sampled = [superconvergent_samples(points, block) for block in blocks]
+    samples = Samples.around(patches.own, patches.star, sampled)
+    indptr, on_surface = _points_of(patches, surface.cell, sum(len(block.cells) for block in blocks))
+    fits = Fits.zero(len(patches.own), dim, c)
+    for alike, places, values, degree in samples.alike(highest[patches.own]):
+        for start in range(0, len(alike), CHUNK):
+            some = slice(start, start + CHUNK)
+            basis = Basis.over(places[some], degree)
+            A, b = _normal_equations(basis, places[some], values[some], body, axisymmetric)
+            first = indptr[alike[some]]
+            patch, entry = ranges(first, indptr[alike[some] + 1] - first)
+            _add_tractions(A, b, basis, surface, patch, on_surface[entry])
+            coefficients = np.linalg.solve(A, b[..., None]).reshape(len(b), -1, c)
+            # the mean alone of a patch without slopes: equilibrium has nothing to say about it
+            failed = ~basis.kept[:, 1]
+            coefficients[failed] = 0.0
+            coefficients[failed, 0] = values[some][failed].mean(axis=1)
+            basis.put(fits, alike[some], coefficients)
+    return Recovered(patches.lent(points, fits), int(fits.failed.sum()), int(fits.flattened.sum()))
 
-    # Unknowns: function, then component.
-    size = (dim + 1) * c
-    A = np.einsum("pab,ij->paibj", gram, np.eye(c)).reshape(p, size, size)
-    b = right.reshape(p, size)
-    apply = stress_tensor(np.eye(c))[:, :dim, :dim]
-    divergence = np.zeros((dim, dim + 1, c))
-    divergence[:, 1:] = apply.transpose(1, 2, 0)
-    D = divergence.reshape(dim, size)
-    A += (BALANCE * count)[:, None, None] * (D.T @ D)
-    b = b - (BALANCE * count * radius)[:, None] * (D.T @ body)
-    patch, facet = _facets_of(own, star, surface.cell, sum(len(block.cells) for block in blocks))
-    for start in range(0, len(patch), CHUNK):
-        q, f = patch[start : start + CHUNK], facet[start : start + CHUNK]
-        at = np.hstack([np.ones((len(q), 1)), (surface.centre[f] - centre[q]) / radius[q, None]])
-        across = np.einsum("kij,sjl,kl->kis", surface.known[f], apply, surface.normal[f], optimize=True)
-        rows = (at[:, None, :, None] * across[:, :, None]).reshape(len(q), dim, size)
-        np.add.at(A, q, SURFACE * np.matmul(rows.swapaxes(1, 2), rows))
+
+def _normal_equations(
+    basis: Basis, places: FloatArray, values: FloatArray, body: FloatArray, axisymmetric: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return the matrices, (n, s, s), and right sides of samples and equilibrium; unknowns by function, component."""
+    (n, k, dim), c = places.shape, values.shape[2]
+    functions = basis.at(places)
+    m = functions.shape[2]
+    size = m * c
+    # Functions are orthonormal over the samples; a zero one keeps its own zero coefficient.
+    A = np.zeros((n, size, size))
+    A[:, np.arange(size), np.arange(size)] = np.repeat(np.where(basis.kept, float(k), 1.0), c, axis=1)
+    b = np.matmul(functions.swapaxes(1, 2), values).reshape(n, size)
+    flat = m == 1 + dim and not axisymmetric
+    where, count = (places[:, :1], k) if flat else (places, 1)
+    q = where.shape[1]
+    rows = np.einsum("cij,nqaj->nqiac", _tensors(c, dim), basis.gradients(where), optimize=True)
+    if axisymmetric:
+        over_r = functions / places[:, :, :1]
+        rows[:, :, 0, :, component_of(0, 0)] += over_r
+        rows[:, :, 0, :, component_of(2, 2)] -= over_r
+        rows[:, :, 1, :, component_of(0, 1)] += over_r
+    rows = rows.reshape(n, q * dim, size)
+    weight = BALANCE * count * basis.radius**2
+    A += weight[:, None, None] * np.matmul(rows.swapaxes(1, 2), rows)
+    b -= weight[:, None] * np.matmul(np.tile(body, q), rows)
+    return A, b
+
+
+def _add_tractions(
+    A: FloatArray, b: FloatArray, basis: Basis, surface: Surface, patch: IntArray, point: IntArray
+) -> None:
+    """Add the points of the surface to the equations of patches, a pair (patch, point) for each entry."""
+    dim = surface.place.shape[1]
+    size = A.shape[1]
+    c = size // basis.kept.shape[1]
+    for start in range(0, len(patch), 16 * CHUNK):
+        p, f = patch[start : start + 16 * CHUNK], point[start : start + 16 * CHUNK]
+        functions = basis.take(p).at(surface.place[f][:, None])[:, 0]
+        across = np.einsum("kij,sjl,kl->kis", surface.known[f], _tensors(c, dim), surface.normal[f], optimize=True)
+        rows = (functions[:, None, :, None] * across[:, :, None]).reshape(len(p), dim, size)
         given = np.einsum("kij,kj->ki", surface.known[f], surface.traction[f])
-        np.add.at(b, q, SURFACE * np.einsum("kir,ki->kr", rows, given))
-    good = ~failed
-    solution = np.zeros((p, dim + 1, c))
-    solution[good] = np.linalg.solve(A[good], b[good][..., None]).reshape(-1, dim + 1, c)
-    solution[failed, 0] = right[failed, 0] / count[failed, None]
-
-    shares = lending(topology.node_graph(mesh, n_points).astype(bool), used, inner, own).tocoo()
-    node, patch = shares.coords
-    at = np.hstack([np.ones((len(node), 1)), (points[node] - centre[patch]) / radius[patch, None]])
-    values = shares.data[:, None] * np.matmul(at[:, None], solution[patch])[:, 0]
-    total = sp.csr_array((np.ones(len(node)), (node, np.arange(len(node)))), shape=(n_points, len(node))) @ values
-    return Recovered(np.asarray(total, np.float64), int(failed.sum()))
+        first = np.flatnonzero(np.r_[True, p[1:] != p[:-1]])
+        A[p[first]] += SURFACE * np.add.reduceat(np.matmul(rows.swapaxes(1, 2), rows), first)
+        b[p[first]] += SURFACE * np.add.reduceat(np.matmul(given[:, None], rows)[:, 0], first)
 
 
-def _sums(patch: IntArray, values: FloatArray, n: int) -> FloatArray:
-    """Add up the rows of each patch; patches are increasing and none is empty."""
-    first = np.searchsorted(patch, np.arange(n))
-    return np.asarray(np.add.reduceat(values, first, axis=0), np.float64)
+def _tensors(c: int, dim: int) -> FloatArray:
+    """Return the part in space of the tensors of unit components, (c, dim, dim)."""
+    return stress_tensor(np.eye(c))[:, :dim, :dim]
 
 
-def _outer(v: FloatArray) -> FloatArray:
-    return np.asarray(v[:, :, None] * v[:, None], np.float64)
-
-
-def _facets_of(
-    nodes: IntArray, star: tuple[IntArray, IntArray], cell: IntArray, n_cells: int
-) -> tuple[IntArray, IntArray]:
-    """Return the pairs of a patch and a facet of the surface of one of its cells."""
-    indptr, cells = star
-    length = indptr[nodes + 1] - indptr[nodes]
-    start = np.cumsum(length) - length
-    entry = np.arange(length.sum()) - np.repeat(start, length) + np.repeat(indptr[nodes], length)
-    incidence = sp.csr_array(
-        (np.ones(len(entry), np.int32), (np.repeat(np.arange(len(nodes)), length), cells[entry])),
-        shape=(len(nodes), n_cells),
-    )
+def _points_of(patches: Patches, cell: IntArray, n_cells: int) -> tuple[IntArray, IntArray]:
+    """Return the points of the surface on the cells of each patch: those of patch i from indptr[i] on."""
+    indptr, cells = patches.star
+    own = patches.own
+    row, entry = ranges(indptr[own], indptr[own + 1] - indptr[own])
+    incidence = sp.csr_array((np.ones(len(row), np.int32), (row, cells[entry])), shape=(len(own), n_cells))
     owners = sp.csr_array((np.ones(len(cell), np.int32), (cell, np.arange(len(cell)))), shape=(n_cells, len(cell)))
-    patch, facet = (incidence @ owners).nonzero()
-    order = np.argsort(patch, kind="stable")
-    return patch[order].astype(np.int64), facet[order].astype(np.int64)
+    found = sp.csr_array(incidence @ owners)
+    return found.indptr.astype(np.int64), found.indices.astype(np.int64)

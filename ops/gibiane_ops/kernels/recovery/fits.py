@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,17 +57,27 @@ class Samples:
         Samples
         """
         indptr, cells = star
-        patch, entry = _ranges(indptr[nodes], indptr[nodes + 1] - indptr[nodes])
+        patch, entry = ranges(indptr[nodes], indptr[nodes + 1] - indptr[nodes])
         per_cell = np.concatenate([np.full(len(places), places.shape[1]) for places, _ in sampled])
         start = np.cumsum(per_cell) - per_cell
         cell = cells[entry]
-        row, sample = _ranges(start[cell], per_cell[cell])
+        row, sample = ranges(start[cell], per_cell[cell])
         places = np.concatenate([each.reshape(-1, each.shape[2]) for each, _ in sampled])
         values = np.concatenate([each.reshape(-1, each.shape[2]) for _, each in sampled])
         return cls(patch[row], places[sample], values[sample])
 
+    def alike(self, degree: IntArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray, int]]:
+        """Yield patches of one degree and number k of samples, their places (n, k, dim), values, and the degree."""
+        length = np.bincount(self.patch, minlength=len(degree))
+        first = np.cumsum(length) - length
+        kinds, kind = np.unique(length * 3 + degree, return_inverse=True)
+        for number, key in enumerate(kinds):
+            patches = np.flatnonzero(kind == number)
+            rows = first[patches][:, None] + np.arange(key // 3)
+            yield patches, self.places[rows], self.values[rows], int(key % 3)
 
-def _ranges(start: IntArray, length: IntArray) -> tuple[IntArray, IntArray]:
+
+def ranges(start: IntArray, length: IntArray) -> tuple[IntArray, IntArray]:
     """Return the numbers start[i], start[i] + 1, ... of every range in one array, after the range of each."""
     row = np.repeat(np.arange(len(start)), length)
     first = np.cumsum(length) - length
@@ -99,6 +109,14 @@ class Fits:
     triple: FloatArray
     failed: NDArray[np.bool_]
     flattened: NDArray[np.bool_]
+
+    @classmethod
+    def zero(cls, n: int, dim: int, c: int) -> Fits:
+        """Make n polynomials that are zero."""
+        return cls(
+            np.zeros((n, dim)), np.zeros((n, c)), np.zeros((n, dim, c)), np.zeros((n, dim, dim, c)), np.zeros((n, c)),
+            np.zeros(n, bool), np.zeros(n, bool),
+        )  # fmt: skip
 
     def at(self, patch: IntArray, places: FloatArray) -> FloatArray:
         """Evaluate polynomials at places, one for each; (k, c)."""
@@ -138,18 +156,9 @@ def fit(samples: Samples, degree: IntArray) -> Fits:
     ----
     One batch for each number of samples in a patch.
     """
-    n, dim, c = len(degree), samples.places.shape[1], samples.values.shape[1]
-    found = Fits(
-        np.zeros((n, dim)), np.zeros((n, c)), np.zeros((n, dim, c)), np.zeros((n, dim, dim, c)), np.zeros((n, c)),
-        np.zeros(n, bool), np.zeros(n, bool),
-    )  # fmt: skip
-    length = np.bincount(samples.patch, minlength=n)
-    first = np.cumsum(length) - length
-    kinds, kind = np.unique(length * 3 + degree, return_inverse=True)
-    for number, key in enumerate(kinds):
-        patches = np.flatnonzero(kind == number)
-        rows = first[patches][:, None] + np.arange(key // 3)
-        _fit_alike(found, patches, samples.places[rows], samples.values[rows], int(key % 3))
+    found = Fits.zero(len(degree), samples.places.shape[1], samples.values.shape[1])
+    for patches, places, values, each in samples.alike(degree):
+        _fit_alike(found, patches, places, values, each)
     return found
 
 

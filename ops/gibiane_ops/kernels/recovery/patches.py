@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 
 from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock
-from gibiane_ops.kernels.recovery.fits import MULTILINEAR, Samples, fit
+from gibiane_ops.kernels.recovery.fits import MULTILINEAR, Fits, Samples, fit
 from gibiane_ops.kernels.recovery.samples import superconvergent_samples
 from gibiane_ops.kernels.topology import Block
 
@@ -56,31 +58,63 @@ def patch_recovery(
     ----
     Batches of small symmetric matrices (up to 6 x 6), one per inner corner; no loop over nodes.
     """
-    n_points = len(points)
-    whole = [(block.shape.name, block.cells) for block in blocks]
-    mesh = topology.corner_blocks(whole)
-    used = topology.used_nodes([corners for _, corners in mesh])
-    inner, own = patch_nodes(mesh, used, n_points)
-    highest = np.full(n_points, 2 if degree is None else degree)
-    for block in blocks:
-        highest[block.cells] = np.minimum(highest[block.cells], block.shape.degree)
+    mesh = [(block.shape.name, block.cells) for block in blocks]
+    patches = Patches.of(mesh, len(points))
+    highest = np.full(len(points), 2 if degree is None else degree)
+    lower_to_elements(highest, blocks)
     if full:
-        tensor = np.ones(n_points, bool)
+        tensor = np.ones(len(points), bool)
         for block in blocks:
             tensor[block.cells] &= block.shape.name in TENSOR
         highest[tensor] = MULTILINEAR
     sampled = [superconvergent_samples(points, block) for block in blocks]
-    star = topology.node_to_cells(mesh, n_points)
-    fits = fit(Samples.around(own, star, sampled), highest[own])
+    fits = fit(Samples.around(patches.own, patches.star, sampled), highest[patches.own])
+    return Recovered(patches.lent(points, fits), int(fits.failed.sum()), int(fits.flattened.sum()))
 
-    straight = all(block.shape.degree == 1 for block in blocks)
-    graph = topology.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
-    weights = lending(graph.astype(bool), used, inner, own)
-    shares = (weights + _middles(whole, n_points) @ weights).tocoo()
-    node, patch = shares.coords
-    fitted = shares.data[:, None] * fits.at(patch, points[node])
-    total = sp.csr_array((np.ones(len(node)), (node, np.arange(len(node)))), shape=(n_points, len(node))) @ fitted
-    return Recovered(np.asarray(total, np.float64), int(fits.failed.sum()), int(fits.flattened.sum()))
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """The corners that have a patch, and what the others take of it.
+
+    Attributes
+    ----------
+    own : (p,) int64
+        The corners inside, and these that need a patch of their own.
+    star : (indptr, cells)
+        Cells around each corner, see `topology.node_to_cells`.
+    shares : (n_points, p) csr_array
+        Share of each patch in the value at each node; rows of nodes sum to 1.
+    """
+
+    own: IntArray
+    star: tuple[IntArray, IntArray]
+    shares: sp.csr_array
+
+    @classmethod
+    def of(cls, blocks: Sequence[Block], n_points: int) -> Patches:
+        """Place the patches of the elements of one solid."""
+        mesh = topology.corner_blocks(blocks)
+        used = topology.used_nodes([corners for _, corners in mesh])
+        inner, own = patch_nodes(mesh, used, n_points)
+        straight = all(shape(name).degree == 1 for name, _ in blocks)
+        graph = topology.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
+        weights = lending(graph.astype(bool), used, inner, own)
+        shares = sp.csr_array(weights + _middles(blocks, n_points) @ weights)
+        return cls(own, topology.node_to_cells(mesh, n_points), shares)
+
+    def lent(self, points: FloatArray, fits: Fits) -> FloatArray:
+        """Evaluate the polynomials of the patches at the nodes that take them, (n_points, c)."""
+        shares = self.shares.tocoo()
+        node, patch = shares.coords
+        fitted = shares.data[:, None] * fits.at(patch, points[node])
+        total = sp.csr_array((np.ones(len(node)), (node, np.arange(len(node)))), shape=(len(points), len(node)))
+        return np.asarray(total @ fitted, np.float64)
+
+
+def lower_to_elements(degree: IntArray, blocks: Sequence[StressBlock]) -> None:
+    """Lower degrees at nodes, (n_points,), in place, to those of the elements around them."""
+    for block in blocks:
+        degree[block.cells] = np.minimum(degree[block.cells], block.shape.degree)
 
 
 def patch_nodes(mesh: Sequence[Block], used: IntArray, n_points: int) -> tuple[IntArray, IntArray]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from gibiane_ops.kernels import geometry, quadrature
 from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.recovery.blocks import StressBlock, centre_values
 from gibiane_ops.kernels.supports import through_points
 
@@ -16,6 +17,25 @@ _FEWER = {
     "PY13": quadrature.pyramid(2),
 }
 """Rules with fewer points than that of the stiffness."""
+
+_ON_SURFACE = {"SEG3": quadrature.line(2), "TRI6": quadrature.triangle(2), "QUA8": quadrature.square(2)}
+"""Points of facets where patches look at the tractions: as dense as the samples."""
+
+
+def surface_points(facet: Shape) -> FloatArray:
+    """Give the reference points of a facet at which patches look at tractions: its middle, some in the second degree.
+
+    Parameters
+    ----------
+    facet : Shape
+
+    Returns
+    -------
+    (q, dim) float64
+    """
+    if facet.name in _ON_SURFACE:
+        return _ON_SURFACE[facet.name].points
+    return np.asarray(facet.ref_nodes.mean(axis=0, keepdims=True), np.float64)
 
 
 def superconvergent_samples(points: FloatArray, block: StressBlock) -> tuple[FloatArray, FloatArray]:
