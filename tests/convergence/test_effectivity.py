@@ -102,7 +102,8 @@ def round_an_axis(shape: str, n: int) -> dict[str, list[float]]:
 
 @pytest.mark.parametrize(("shape", "degree"), [("QUA4", 1), ("TRI3", 1), ("QUA8", 2), ("TRI6", 2)])
 def test_sphere_about_an_axis(shape, degree):
-    coarse, fine = round_an_axis(shape, 8), round_an_axis(shape, 16)
+    n = 16 // degree
+    coarse, fine = round_an_axis(shape, n), round_an_axis(shape, 2 * n)
     assert np.log2(coarse["EXAC"][0] / fine["EXAC"][0]) == pytest.approx(degree, abs=0.05)
     theta, scatter = fine["SPRE"]
     assert 0.8 <= theta <= 1.2

@@ -202,7 +202,6 @@ MECHANICS = {
     "the bound holds for the same problem with Tresca's friction: MATE 'SEUI' of MU times PN (COFR)": "la borne vaut pour le même problème avec le frottement de Tresca : MATE 'SEUI' égal à MU fois PN (COFR)",
     "{count} nodes keep a force under the loads given: the tractions around them count as unknown": "il reste une force à {count} noeuds sous le chargement donné : les vecteurs contrainte autour d'eux comptent comme inconnus",
     "that is right for contact and point loads; give the others by 'PRES', 'FSUR' or 'VOLU'": "c'est juste pour le contact et les forces ponctuelles ; donner le reste par 'PRES', 'FSUR' ou 'VOLU'",
-    "patches with equilibrium are made on linear elements in space or a plane, not on {shape} in mode {mode}": "les ensembles avec équilibre se font sur des éléments linéaires, dans l'espace ou le plan, non sur des {shape} en mode {mode}",
     "LISSER 'SPR' takes every element": "LISSER 'SPR' prend tous les éléments",
     "patches across a contact need a contact model between surfaces whose nodes coincide": "les ensembles à travers un contact demandent un modèle de contact entre surfaces à noeuds confondus",
     "mesh the contact surface once and copy it for the other solid": "mailler une fois la surface de contact et la copier pour l'autre solide",
