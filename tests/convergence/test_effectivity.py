@@ -74,8 +74,9 @@ def test_equilibrated_stress_bounds_the_error(n):
 
 SPHERE = """
 DEBP BOULE X*'LISTREEL' Y*'LISTREEL' ;
-  R2 = (X * X) + (Y * Y) ; C = 1. / 7. ; Q = 8. * C / (R2 ** 1.5) ; UN = (0. * R2) + 1. ; T = TABLE ; D = (-1.5 * Q) / R2 ;
-  T.'SMTT' = (C * UN) + (0.5 * Q) ; T.'SMRR' = (T.'SMTT') + (D * X * X) ; T.'SMZZ' = (T.'SMTT') + (D * Y * Y) ; T.'SMRZ' = D * X * Y ;
+  R2 = (X * X) + (Y * Y) ; C = 1. / 7. ; Q = 8. * C / (R2 ** 1.5) ; UN = (0. * R2) + 1. ; D = (-1.5 * Q) / R2 ;
+  T = TABLE ; T.'SMTT' = (C * UN) + (0.5 * Q) ;
+  T.'SMRR' = (T.'SMTT') + (D * X * X) ; T.'SMZZ' = (T.'SMTT') + (D * Y * Y) ; T.'SMRZ' = D * X * Y ;
 FINP T ;
 OPTI DIME 2 MODE AXIS ELEM DEGRE ;
 A = CERC N (1. 0.) (0. 0.) (0. 1.) ; B = CERC N (2. 0.) (0. 0.) (0. 2.) ; S = CHAN TYPEL (REGL N A B) ;
