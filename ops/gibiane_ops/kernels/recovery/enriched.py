@@ -100,7 +100,7 @@ def enriched_recovery(
             first = indptr[alike[some]]
             patch, entry = ranges(first, indptr[alike[some] + 1] - first)
             _add_tractions(A, b, basis, surface, patch, on_surface[entry])
-            coefficients = np.linalg.solve(A, b[..., None]).reshape(len(b), -1, c)
+            coefficients = np.asarray(np.linalg.solve(A, b[..., None]), np.float64).reshape(len(b), -1, c)
             # the mean alone of a patch without slopes: equilibrium has nothing to say about it
             failed = ~basis.kept[:, 1]
             coefficients[failed] = 0.0

@@ -48,7 +48,8 @@ class Basis:
         radius = np.sqrt(np.where(good, spread.mean(axis=1), 1.0))
         kept = np.hstack([np.ones((n, 1), bool), np.repeat(good[:, None], dim, axis=1)])
         if degree < 2:
-            return cls(centre, radius, scaling, *(np.zeros((n, *s)) for s in ((0,), (dim, 0), (0, 0))), kept)
+            none = np.zeros((n, 0)), np.zeros((n, dim, 0)), np.zeros((n, 0, 0))
+            return cls(centre, radius, scaling, *none, kept)
         y = np.matmul(offset, scaling)
         terms = _products(y)
         mean = terms.mean(axis=1)
@@ -61,8 +62,15 @@ class Basis:
 
     def take(self, rows: IntArray) -> Basis:
         """Return the functions of some patches, one may come several times."""
-        fields = (self.centre, self.radius, self.scaling, self.mean, self.along, self.modes, self.kept)
-        return Basis(*(field[rows] for field in fields))
+        return Basis(
+            self.centre[rows],
+            self.radius[rows],
+            self.scaling[rows],
+            self.mean[rows],
+            self.along[rows],
+            self.modes[rows],
+            self.kept[rows],
+        )
 
     def at(self, places: FloatArray) -> FloatArray:
         """Evaluate at places, (n, q, dim): (n, q, m)."""
@@ -97,9 +105,8 @@ class Basis:
             value = value - np.matmul(self.mean[:, None], second)[:, 0]
             slope = slope - np.matmul(self.along, second)
             matrix = np.zeros((len(patches), dim, dim, coefficients.shape[2]))
-            # twice on the diagonal, once on either side of it
-            np.add.at(matrix, (slice(None), i, j), second * (root / 2)[:, None])
-            np.add.at(matrix, (slice(None), j, i), second * (root / 2)[:, None])
+            half = np.where(i == j, 1.0, 0.5) * root
+            matrix[:, i, j] = matrix[:, j, i] = second * half[:, None]
             fits.curvature[patches] = np.einsum("nai,nijc,nbj->nabc", self.scaling, matrix, self.scaling, optimize=True)
         fits.centre[patches], fits.value[patches] = self.centre, value
         fits.slope[patches] = np.matmul(self.scaling, slope)
