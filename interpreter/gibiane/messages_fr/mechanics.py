@@ -202,7 +202,6 @@ MECHANICS = {
     "the bound holds for the same problem with Tresca's friction: MATE 'SEUI' of MU times PN (COFR)": "la borne vaut pour le même problème avec le frottement de Tresca : MATE 'SEUI' égal à MU fois PN (COFR)",
     "{count} nodes keep a force under the loads given: the tractions around them count as unknown": "il reste une force à {count} noeuds sous le chargement donné : les vecteurs contrainte autour d'eux comptent comme inconnus",
     "that is right for contact and point loads; give the others by 'PRES', 'FSUR' or 'VOLU'": "c'est juste pour le contact et les forces ponctuelles ; donner le reste par 'PRES', 'FSUR' ou 'VOLU'",
-    "LISSER 'SPR' takes every element": "LISSER 'SPR' prend tous les éléments",
     "patches across a contact need a contact model between surfaces whose nodes coincide": "les ensembles à travers un contact demandent un modèle de contact entre surfaces à noeuds confondus",
     "mesh the contact surface once and copy it for the other solid": "mailler une fois la surface de contact et la copier pour l'autre solide",
     "one solid holds materials {ratio} times stiffer than others: its smoothed stress runs across their jumps": "un même solide contient des matériaux {ratio} fois plus raides que d'autres : sa contrainte lissée passe à travers leurs sauts",
