@@ -22,6 +22,7 @@ from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equili
 from gibiane_ops.values.estimates import KIND, NORM, REFE, TABL, Guarantee, Parts, results, stresses_of
 from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior
 from gibiane_ops.values.failures import worded
+from gibiane_ops.values.following import carried
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_compliance, on_zone, solid_zones
@@ -93,7 +94,7 @@ def _add_contact(ctx: Context, zones: list[ModelZone], sides: list[Side], contac
                 at="reaction",
                 hint="without 'REAC' the contact surfaces count as free of load",
             )
-        slave = pairs.pairs[:, 0]
+        slave = carried(pairs, rea.nodes).pairs[:, 0]
         force = rea.table(FORCES[zones[0].family], slave)[:, :dim]
         blocks = zone.slave.kernel_blocks
         with worded(ctx, at="reaction"):

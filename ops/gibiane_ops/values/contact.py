@@ -20,6 +20,7 @@ from gibiane_ops.kernels.contact.pairs import ContactPairs
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.conditions import family
 from gibiane_ops.values.failures import worded
+from gibiane_ops.values.following import carried
 from gibiane_ops.values.modele import DISPLACEMENTS, FORCES, ContactZone, Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
@@ -262,7 +263,7 @@ def solved_contacts(
     if not model.contacts:
         ctx.fail(26, "this model has no contact zone", at="mc", hint="MODE G1 G2 'CONTACT' ... makes one")
     for zone in model.contacts:
-        pairs = zone_pairs(ctx, zone, "mc")
+        pairs = carried(zone_pairs(ctx, zone, "mc"), reaction.nodes)
         # forces of a node on a sharp edge are known together: it counts for the side that comes first
         first = np.unique(pairs.pairs[:, 0], return_index=True)[1]
         if len(first) < len(pairs.pairs):

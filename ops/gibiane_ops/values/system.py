@@ -12,6 +12,7 @@ from gibiane_ops.kernels.contact.law import Friction, friction, joined_laws
 from gibiane_ops.kernels.contact.pairs import ContactPairs, joined, no_pairs
 from gibiane_ops.kernels.topology import used_nodes
 from gibiane_ops.values.champs import DIFFUS, ChPoint
+from gibiane_ops.values.following import without_followers
 from gibiane_ops.values.nodes import FloatArray, IntArray, NodeStore, node_store
 from gibiane_ops.values.rigidite import ConditionPart, ConditionTerms, ContactPart, Rigidite
 
@@ -42,6 +43,8 @@ class System:
     reactions, stop_reactions : csr_array
         Where the multipliers of C and of the stops act: ``K u = F + reactions.T m``. These rows themselves unless
         RELA 'DUAL' gave others.
+    following : (k,) int64
+        Multiplier nodes of the contact pairs left out, because their middles follow the ends of their side.
     symmetric : bool
         Whether K is, and the conditions act along themselves.
     """
@@ -60,6 +63,7 @@ class System:
     stop_signs: FloatArray
     reactions: sp.csr_array
     stop_reactions: sp.csr_array
+    following: IntArray
     symmetric: bool = True
 
     @property
@@ -79,11 +83,11 @@ class System:
         """
         F = np.zeros(len(self.nodes) * self.dim)
         imposed = np.zeros(len(self.multipliers))
-        own = np.concatenate([self.multipliers, self.stop_multipliers, *(part.multipliers for part in self.contacts)])
+        own = [self.multipliers, self.stop_multipliers, self.following, *(part.multipliers for part in self.contacts)]
         for name, (nodes, values) in field.parts.items():
             if name == "FLX":
                 imposed = field.at("FLX", self.multipliers)
-                stray = np.setdiff1d(nodes[values != 0], own)
+                stray = np.setdiff1d(nodes[values != 0], np.concatenate(own))
                 if len(stray) and not lenient:
                     ctx.fail(
                         53,
@@ -204,6 +208,7 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
     carriers = np.concatenate([np.zeros(0, np.int64), *(c.multipliers for c in conditions)])
     equal, stop = np.flatnonzero(sign == 0), np.flatnonzero(sign)
     turned = sp.diags_array(sign[stop])
+    contacts, following = without_followers(store, nodes, len(names), C[equal], rigidity.contacts)
     return System(
         store,
         nodes,
@@ -212,13 +217,14 @@ def build(ctx: Context, rigidity: Rigidite, *, bilateral: bool = False) -> Syste
         K,
         C[equal],
         conditions,
-        rigidity.contacts,
+        contacts,
         carriers[equal],
         sp.csr_array(turned @ C[stop]) if len(stop) else C[stop],
         carriers[stop],
         sign[stop],
         reactions[equal],
         sp.csr_array(turned @ reactions[stop]) if len(stop) else C[stop],
+        following,
         symmetric,
     )
 

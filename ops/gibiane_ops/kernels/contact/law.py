@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels.arrays import FloatArray
+from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.contact.cone import norms, orthogonal_projection
 from gibiane_ops.kernels.errors import BadValue, UnsupportedLaw
 
@@ -109,6 +109,31 @@ class Friction:
         """
         if self.adhesion.any():
             raise UnsupportedLaw(method, "laws without adhesion")
+
+    def shared(self, middle: IntArray, kept: IntArray) -> Friction:
+        """Keep some pairs; what the middles of sides bear by their area goes to the ends, half and half.
+
+        Parameters
+        ----------
+        middle : (k, 3) int64
+            Positions of pairs that are not kept, and of the two ends of their side.
+        kept : (n,) int64
+        """
+
+        def moved(values: FloatArray) -> FloatArray:
+            total = values.copy()
+            np.add.at(total, middle[:, 1:], values[middle[:, :1]] / 2)
+            return total[kept]
+
+        return replace(
+            self,
+            mu=self.mu[kept],
+            cohesion=moved(self.cohesion),
+            slip_stiffness=moved(self.slip_stiffness),
+            exponent=self.exponent[kept],
+            slip_scale=self.slip_scale[kept],
+            adhesion=moved(self.adhesion),
+        )
 
     def scaled(self, force: float, length: float) -> Friction:
         """Write the law in units of a force and a length."""

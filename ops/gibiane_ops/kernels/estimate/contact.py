@@ -92,7 +92,7 @@ def densities(
 
 
 def with_following(facets: Sequence[Block], nodes: IntArray) -> tuple[IntArray, sp.csr_array]:
-    """Add the middles on the sides of linear facets: they follow their corners, and make no contact pair.
+    """Add the middles that make no contact pair between corners that do: they follow these, beside linear elements.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def with_following(facets: Sequence[Block], nodes: IntArray) -> tuple[IntArray, 
     follow : (k + h, k) csr_array
         Values at all of them from those at the nodes.
     """
-    held = topology.middles_on_linear(facets)
+    held = topology.middles(facets)
     held = held[np.isin(held[:, :2], nodes).all(axis=1) & ~np.isin(held[:, 2], nodes)]
     k, h = len(nodes), len(held)
     order = np.argsort(nodes)
