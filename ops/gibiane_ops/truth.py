@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,9 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import FLOTTANT, MCHAML, MMODEL, MOT, Table
-from gibiane_ops.kernels import geometry
-from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.estimate.truth import exact_error
 from gibiane_ops.kernels.estimate.zz import SolidError, true_error
-from gibiane_ops.kernels.quadrature import Rule
 from gibiane_ops.kernels.recovery import StressBlock
 from gibiane_ops.kernels.supports import moved
 from gibiane_ops.values.champs import MChaml
@@ -56,8 +55,8 @@ def _by_field(
     given = [("sig", sig), ("mat", mat), ("exact", exact)]
     stress, truth, material = told_apart(ctx, given, STRESS, STRESS, MATERIAL)
 
-    def at_points(zone: ModelZone, of: Shape) -> tuple[Rule, FloatArray]:
-        values = on_zone(ctx, truth, zone, "exact").values
+    def measured(zone: ModelZone, block: StressBlock, law: FloatArray) -> SolidError:
+        values, of = on_zone(ctx, truth, zone, "exact").values, block.shape
         rule = of.mass_rule if truth.support in ("NOEUD", "MASSE") else of.stiffness_rule
         if len(rule.weights) == 1 or values.shape[1] == 1:
             ctx.fail(
@@ -67,9 +66,11 @@ def _by_field(
                 shape=zone.shape,
                 hint="give the exact stress at the nodes (CHAN 'CHAM') or at the points 'MASSE'",
             )
-        return rule, moved(of, values, truth.support, "MASSE" if rule is of.mass_rule else "STRESSES")
+        known = moved(of, values, truth.support, "MASSE" if rule is of.mass_rule else "STRESSES")
+        points = node_store(ctx).coords[:, : zone.dim]
+        return true_error(points, block, known, rule, law, axisymmetric=zone.axisymmetric)
 
-    return _true(ctx, model, stress, material, at_points, kind, norm, tabl)
+    return _true(ctx, model, stress, material, measured, kind, norm, tabl)
 
 
 @ERRE.form(
@@ -100,29 +101,31 @@ def _by_procedure(
 ) -> Any:
     stress, material = told_apart(ctx, [("sig", sig), ("mat", mat)], STRESS, MATERIAL)
 
-    def at_points(zone: ModelZone, of: Shape) -> tuple[Rule, FloatArray]:
-        X = node_store(ctx).coords[zone.cells][..., : zone.dim]
-        where = geometry.positions(of, X, of.mass_rule.points)
-        given = ctx.call(proc, *(ListReel(where[..., i].ravel()) for i in range(zone.dim)))
-        if len(given) != 1 or not isinstance(given[0], Table):
-            ctx.fail(26, "the procedure {name} must return one TABLE", at="proc", name=proc)
-        values = np.zeros((*where.shape[:2], len(zone.stresses)))
-        for i, name in enumerate(zone.stresses):
-            if given[0].has(name):
-                column = given[0].get(name)
-                if not isinstance(column, ListReel) or len(column.values) != where[..., 0].size:
-                    ctx.fail(
-                        212,
-                        "{name}.'{component}' must be a LISTREEL of {count} values, one a point",
-                        at="proc",
-                        name=proc,
-                        component=name,
-                        count=where[..., 0].size,
-                    )
-                values[..., i] = column.values.reshape(where.shape[:2])
-        return of.mass_rule, values
+    def measured(zone: ModelZone, block: StressBlock, law: FloatArray) -> SolidError:
+        def exact(x: FloatArray) -> FloatArray:
+            given = ctx.call(proc, *(ListReel(x[:, i]) for i in range(zone.dim)))
+            if len(given) != 1 or not isinstance(given[0], Table):
+                ctx.fail(26, "the procedure {name} must return one TABLE", at="proc", name=proc)
+            values = np.zeros((len(x), len(zone.stresses)))
+            for i, name in enumerate(zone.stresses):
+                if given[0].has(name):
+                    column = given[0].get(name)
+                    if not isinstance(column, ListReel) or len(column.values) != len(x):
+                        ctx.fail(
+                            212,
+                            "{name}.'{component}' must be a LISTREEL of {count} values, one a point",
+                            at="proc",
+                            name=proc,
+                            component=name,
+                            count=len(x),
+                        )
+                    values[:, i] = column.values
+            return values
 
-    return _true(ctx, model, stress, material, at_points, kind, norm, tabl)
+        points = node_store(ctx).coords[:, : zone.dim]
+        return exact_error(points, block, exact, law, axisymmetric=zone.axisymmetric)
+
+    return _true(ctx, model, stress, material, measured, kind, norm, tabl)
 
 
 def _true(
@@ -130,7 +133,7 @@ def _true(
     model: Modele,
     stress: MChaml,
     material: MChaml,
-    at_points: Any,
+    measured: Callable[[ModelZone, StressBlock, FloatArray], SolidError],
     kind: str | None,
     norm: str | None,
     tabl: bool,
@@ -139,12 +142,7 @@ def _true(
     for zone in zones:
         of = shape(zone.shape)
         raw = moved(of, on_zone(ctx, stress, zone, "sig").values, stress.support, "STRESSES")
-        rule, exact = at_points(zone, of)
-        points = node_store(ctx).coords[:, : zone.dim]
         law = elastic_compliance(ctx, material, zone, "mat")
         with worded(ctx, at="model"):
-            found: SolidError = true_error(
-                points, StressBlock(of, zone.cells, raw), exact, rule, law, axisymmetric=zone.axisymmetric
-            )
-        errors.append(found)
+            errors.append(measured(zone, StressBlock(of, zone.cells, raw), law))
     return results(ctx, Parts(zones, errors), kind, norm, tabl, EXACT, None)
