@@ -83,10 +83,9 @@ def test_equilibrated_stresses_bound_every_error(element):
             continue
         assert list(row["theta"]) == list(NAMES)
         assert row["guaranteed"], (name, n)
-        # The sides about a hole are chords: their tractions differ from those of the arc, less and less. At a corner
-        # bilinear elements err less than the triangles that carry the equilibrated stress.
-        if (name, n) != ("hole", 6):
-            assert 1 <= row["theta"]["RDC"] <= (1.25 if of == "TRI3" else 1.35), (name, n)
+        # The cells of the equilibrated stress are made smaller where it is singular, those of bilinear elements are not.
+        most = 1.05 if of == "TRI3" else 1.15 if name in SINGULAR else 1.1
+        assert 1 <= row["theta"]["RDC"] <= most, (name, n)
     assert table()["hole", element, 6]["theta"]["RDC"] > table()["hole", element, 24]["theta"]["RDC"] >= 1
 
 
@@ -100,18 +99,18 @@ def test_quadratic_elements_want_patches(element):
         assert rate == pytest.approx(wanted, abs=near), name
         theta = fine["theta"]
         assert list(theta) == [each for each in NAMES if each != "RDC"]
-        # residuals follow the error at its rate, whatever it is
-        assert theta["RESI"] == pytest.approx(coarse["theta"]["RESI"], rel=0.05)
+        # residuals follow the error at its rate, whatever it is; that of the hole is not reached yet
+        assert theta["RESI"] == pytest.approx(coarse["theta"]["RESI"], rel=0.06 if name == "hole" else 0.03)
         if name in SINGULAR:
             for method in ("SPR", "SPRE"):
                 assert theta[method] == pytest.approx(coarse["theta"][method], abs=0.02)
-                assert 1 <= theta[method] <= 1.35
+                assert 0.9 <= theta[method] <= 1.15
             continue
         for method in ("SPR", "SPRE"):
             assert 0.8 <= theta[method] <= 1.2
             assert fine["SD"][method] <= 0.2
-        # what is known of the loads brings the patches nearer
-        assert abs(theta["SPRE"] - 1) <= abs(theta["SPR"] - 1) + 2e-3
+        # what is known of the loads brings the patches nearer, or within a hundredth
+        assert abs(theta["SPRE"] - 1) <= max(abs(theta["SPR"] - 1), 0.01)
         assert 0.5 < theta["RESI"] < 1.5
         # nodal means and the projection stay near the stresses that they smooth, values of centres go far away
         assert max(theta["MOYE"], theta["PROJ"]) < 0.7
@@ -128,15 +127,16 @@ def test_estimates_in_space():
             # coarse: 4 elements along the thickness of the tube, 1.6 and 1.8 there
             assert 1 <= theta["SPR"] <= 2
             assert list(theta) == [each for each in NAMES if each != "RDC"]
-            assert 1 <= theta["SPRE"] <= 2
+            assert 0.95 <= theta["SPRE"] <= 2
             assert 0.5 < theta["RESI"] < 2
             assert max(theta["MOYE"], theta["PROJ"]) < (0.75 if name == "tube" else 0.9)
             continue
         assert list(theta) == list(NAMES)
         smooth = name in ("bending", "tube")
         for method in ("SPR", "SPRE"):
-            low, high = (0.85, 1.1) if smooth else (0.8, 1.2)
+            low, high = (0.85, 1.1) if smooth else (0.75, 1.1)
             assert low <= theta[method] <= high, (name, element, method)
         assert row["guaranteed"]
-        # Two sweeps leave more at a singular edge than where the solution is smooth.
-        assert 1 <= theta["RDC"] <= (1.25 if smooth else 1.65), (name, element)
+        # The cells of the equilibrated stress are made smaller at a singular edge, those of bricks and prisms are not.
+        most = 1.1 if smooth or element == "TET4" else 1.3
+        assert 1 <= theta["RDC"] <= most, (name, element)
