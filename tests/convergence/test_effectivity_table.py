@@ -83,7 +83,7 @@ def test_equilibrated_stresses_bound_every_error(element):
             continue
         assert list(row["theta"]) == list(NAMES)
         assert row["guaranteed"], (name, n)
-        # The cells of the equilibrated stress are made smaller where it is singular, those of bilinear elements are not.
+        # The cells of the equilibrated stress are made smaller where it is singular, not those of bilinear elements.
         most = 1.05 if of == "TRI3" else 1.15 if name in SINGULAR else 1.1
         assert 1 <= row["theta"]["RDC"] <= most, (name, n)
     assert table()["hole", element, 6]["theta"]["RDC"] > table()["hole", element, 24]["theta"]["RDC"] >= 1
