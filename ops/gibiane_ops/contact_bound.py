@@ -117,7 +117,7 @@ def _bound_with_contact(
         nodal = nodal and found.nodal
         squares.append(each)
         doubts += _doubts(ctx, state, given.law, found)
-    joint, parts = _joint(ctx, states, given.law, pieces, squares)
+    joint, parts = _joint(ctx, states, given.law, pieces, sides[0], squares)
     solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl, joint, nodal)
     for (square, owner), change in zip(parts, np.split(solid.contact, _ends(parts)), strict=bool(len(solid.contact))):
         np.add.at(square, owner, change)
@@ -132,7 +132,7 @@ def _bound_with_contact(
     doubts += [cutting] if cutting else []
     guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
     more: dict[str, Any] = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
-    if all(state.zone.law == "UNILATERAL" for state in states):
+    if all(state.zone.law == "UNILATERAL" and _without_gap(state) for state in states):
         more |= energy_bounds(solid, float(sum(each.sum() for each in totals)))
     return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, refe, more)
 
@@ -226,14 +226,21 @@ def _ends(parts: Parts) -> IntArray:
 
 
 def _joint(
-    ctx: Context, states: Sequence[SolvedContact], law: MChaml, pieces: Pieces, squares: list[list[FloatArray]]
+    ctx: Context,
+    states: Sequence[SolvedContact],
+    law: MChaml,
+    pieces: Pieces,
+    side: Side,
+    squares: list[list[FloatArray]],
 ) -> tuple[Joint | None, Parts]:
     """Find the facets that are closed at all their nodes, without a gap in the mesh: their tractions may be improved.
 
     Pressures, and with Tresca's law friction too; nothing where friction ties the bounds of the tractions to the
-    pressures. Also tells which contact error of `squares`, and which of its facets, each facet of the joint is part of.
+    pressures, nor where supports hold a facet: its reactions are no contact, and not opposite on the two bodies. Also
+    tells which contact error of `squares`, and which of its facets, each facet of the joint is part of.
     """
     dim = pieces.zones[0].dim
+    fixed = side.facets.nodes[np.abs(side.free).max(axis=(1, 2)) > ROUND_OFF]
     points = pieces.cutting.points
     name, parts = np.arange(len(points)), Parts()
     facets, bounds, slips = [np.zeros((0, dim), np.int64)], [np.zeros((0, dim))], [np.zeros((0, dim, dim))]
@@ -241,20 +248,23 @@ def _joint(
         if state.zone.law not in ("UNILATERAL", "TRESCA"):
             continue
         slave, master = state.pairs.pairs.T
-        there = np.flatnonzero(master >= 0)
-        one, two = (pieces.places(side[there]) for side in (slave, master))
-        open_by = np.abs(state.relative[there, 0] - state.gap[there])
+        one, two = (pieces.places(ends) for ends in (slave, np.where(master < 0, slave, master)))
+        held, touching = np.zeros((2, len(points)), bool)
+        touching[one], touching[two] = True, True
+        held[fixed[touching[fixed].all(axis=1)]] = True
+        open_by = np.abs(state.relative[:, 0] - state.gap)
         size = float(np.ptp(points, axis=0).max())
-        shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[there, 0] < 0)
+        shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[:, 0] < 0)
         shut &= np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size
+        shut &= ~(held[one] | held[two])
         name[one[shut]] = two[shut]
         closed, bound = np.zeros(len(points), bool), np.full(len(points), np.inf)
         slip = np.zeros((len(points), dim))
         closed[one[shut]] = True
-        threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave[there])
+        threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave)
         if state.zone.law == "TRESCA" and threshold is not None:
             bound[one] = threshold
-            slip[one] = np.einsum("nij,ni->nj", state.frames[there, 1:], state.relative[there, 1:])
+            slip[one] = np.einsum("nij,ni->nj", state.frames[:, 1:], state.relative[:, 1:])
         for block, square in zip(state.zone.slave.blocks, own, strict=True):
             cells, _, owner = pieces.facets(block.shape, block.cells)
             kept = closed[cells].all(axis=1)
@@ -266,6 +276,11 @@ def _joint(
     error = float(sum(square.sum() for own in squares for square in own))
     joint = Joint(name, np.concatenate(facets), np.concatenate(bounds), np.concatenate(slips), error)
     return (joint if len(joint.closed) or error else None), parts
+
+
+def _without_gap(state: SolvedContact) -> bool:
+    """Say whether the bodies touch everywhere at first: forces across a gap do work."""
+    return bool(np.abs(state.gap).max(initial=0.0) <= CLOSED * np.abs(state.relative).max(initial=0.0))
 
 
 def _unlawful(violation: float) -> str:

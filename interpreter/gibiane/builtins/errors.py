@@ -28,9 +28,10 @@ ERRE = operator(
     "A facet counts as held where BLOQ holds all its nodes. 'EXAC': the true error, from an exact stress "
     "or a procedure ('PROC'). `XS XC XG CARTE = ERREUR 'CONTACT' MODL SIG MAT MC MATC U REA` adds the contact part: an "
     "estimate, except with 'RDC', where the sum is guaranteed without friction and with Tresca's (a bound "
-    "given on the whole surface, all pairs closed); never with Coulomb's: GARANTI and a note tell. Where prescribed "
-    "displacements and gaps are zero, INFERIEURE and SUPERIEURE of 'RDC' 'TABL' bound the energy of the exact solution "
-    "(dual analysis). The procedure RICHARDSON extrapolates the energies of three meshes.",
+    "given on the whole surface, all pairs closed); never with Coulomb's: GARANTI and a note tell. INFERIEURE and "
+    "SUPERIEURE of 'RDC' 'TABL' bound the energy of the exact solution (dual analysis); the table lacks them where "
+    "prescribed displacements or gaps are not zero, strains are thermal, or 'BALA' is 0. Thermal strains count as uniform in each "
+    "element. The procedure RICHARDSON extrapolates the energies of three meshes.",
     example="""
     OPTI ERRE IGNO DIME 2 ELEM QUA4 MODE PLAN DEFO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;
     S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ;

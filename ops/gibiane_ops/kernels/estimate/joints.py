@@ -1,4 +1,4 @@
-"""Closed contact facets as inner sides, so that the tractions there are improved with the others."""
+"""Closed contact facets as inner sides, or free ones on an obstacle: tractions there are improved with the others."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Joint:
     name : (n,) int64
         For each node the one that stands for it: nodes of a closed pair share it, that of the master.
     closed : (k, d) int64
-        Closed facets by the names of their nodes.
+        Closed facets by the names of their nodes; those on an obstacle by their own nodes.
     bound : (k, d) float64, force / length^(d - 1), optional
         Tresca's bound at these nodes; infinite where only pressures may change, as without it.
     slip : (k, d, d) float64, length, optional
@@ -40,7 +40,7 @@ class Joint:
 
 
 class Joined:
-    """A mesh whose closed contact facets are inner sides.
+    """A mesh whose closed contact facets are inner sides, but for those on an obstacle, which stay on the boundary.
 
     Parameters
     ----------
@@ -76,8 +76,9 @@ class Joined:
         order = np.argsort(joint.closed, axis=1)
         wanted = {tuple(row): i for i, row in enumerate(np.take_along_axis(joint.closed, order, axis=1).tolist())}
         self.crossed = np.flatnonzero(inner & was_boundary)
-        found = np.array([wanted.get(tuple(row), -1) for row in self.mesh.nodes[self.crossed].tolist()], np.int64)
-        self.sides, self.facet = self.crossed[found >= 0], found[found >= 0]
+        skin = np.flatnonzero(was_boundary)
+        found = np.array([wanted.get(tuple(row), -1) for row in self.mesh.nodes[skin].tolist()], np.int64)
+        self.sides, self.facet = skin[found >= 0], found[found >= 0]
         self.normal = np.zeros((len(self.mesh.nodes), dim))
         out = self.mesh.outward[self.mesh.cell[self.sides, 0], self.mesh.local[self.sides, 0]]
         area = np.linalg.norm(out, axis=1)
@@ -90,8 +91,9 @@ class Joined:
             slip = np.take_along_axis(joint.slip, order[:, :, None], axis=1)[self.facet]
             side, _ = self._old(self.mesh.cell[self.sides, 0], self.mesh.local[self.sides, 0])
             old = mesh.nodes[side]
-            # nodes of the slave bear another name
-            sign = np.where((joint.name[old] != old).any(axis=1), 1.0, -1.0)
+            # nodes of the slave bear another name; on an obstacle there is none but the slave
+            slave = (joint.name[old] != old).any(axis=1) | (self.mesh.cell[self.sides, 1] < 0)
+            sign = np.where(slave, 1.0, -1.0)
             self.slide[self.sides] = np.einsum("s,ab,sbi->sai", sign, moments(dim), slip)
 
     def _old(self, cell: IntArray, local: IntArray) -> tuple[IntArray, IntArray]:
