@@ -139,11 +139,11 @@ def equilibrated(
 def energy_bounds(found: Admissible, contact: float = 0.0) -> dict[str, float]:
     """Return bounds of the energy of the exact solution where nothing but loads does work: dual analysis.
 
-    The solution of the mesh has less energy, any stress in equilibrium more. That needs ``int (s_hat - s_h) : eps(u_h)``
-    to be zero (half of the squared contact error, with contact): displacements that are prescribed other than as a
-    rigid motion and thermal strains make it something else, and there is no such bound; nor without a sweep, which
-    makes the reactions others than those of the mesh, and their work seen. Distorted elements, whose stiffness is
-    integrated by points, are none of Galerkin's either.
+    The solution of the mesh has less energy, any stress in equilibrium more. That needs the work
+    ``int (s_hat - s_h) : eps(u_h)`` to be zero (half of the squared contact error, with contact): prescribed
+    displacements, other than as a rigid motion, and thermal strains make it something else, and there is no such
+    bound; nor without a sweep, which makes the reactions others than those of the mesh, and their work seen. Distorted
+    elements, whose stiffness is integrated by points, are none of Galerkin's either.
     """
     energy = float(found.energy.sum())
     work = float(found.sum_energy.sum() - found.error.sum()) / 4 - energy
