@@ -19,7 +19,7 @@ def test_the_short_report_of_the_thesis(tmp_path: Path) -> None:
     shutil.copy(ROOT / "examples" / "these" / "rapport.dgibi", tmp_path)
     paths = os.pathsep.join(str(ROOT / folder) for folder in ("interpreter", "ops"))
     run = subprocess.run(
-        [sys.executable, "-m", "gibiane", "rapport.dgibi"],
+        [sys.executable, "-m", "gibiane", "--workers", "2", "rapport.dgibi"],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": paths},
         capture_output=True,
