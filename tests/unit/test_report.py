@@ -3,12 +3,15 @@
 import base64
 import json
 import re
+from importlib import resources
 
 import numpy as np
 import pytest
 from browser import Browser, find_browser
 
 from gibiane.session import Session
+from gibiane_ops.kernels.report.words import FRENCH
+from gibiane_ops.kernels.report.writing import NO_SCRIPT
 
 SCRIPT = """
 OPTI DIME 3 ELEM CUB8 SORT '{path}' ;
@@ -36,10 +39,11 @@ SORT 'HTML' T ;
 """
 
 
-def written(folder, time="60."):
+def written(folder, time="60.", language=None):
     """Run the script; return its session and the file."""
     path = folder / "report.html"
     session = Session()
+    session.options["LANG"] = language
     session.run_text(SCRIPT.format(path=path.as_posix(), time=time), "report.dgibi")
     assert session.worst == 0
     return session, path
@@ -106,6 +110,31 @@ def test_the_environment_names_the_machine_and_the_versions(tmp_path):
     assert page["title"] == "Environment"
     assert rows["numpy"] == np.__version__
     assert int(rows["Cores"]) >= 1
+
+
+def test_every_word_of_the_page_has_a_french_one():
+    folder = resources.files("gibiane_ops.kernels.report")
+    scripts = "".join(each.read_text(encoding="utf-8") for each in (folder / "page").iterdir() if each.name[-3:] == ".js")
+    python = "".join(
+        each.read_text(encoding="utf-8") for each in folder.iterdir() if each.name[-3:] == ".py" and each.name != "words.py"
+    )
+    python += (resources.files("gibiane_ops.output") / "report.py").read_text(encoding="utf-8")
+    used = set(re.findall(r'said\("([^"]+)"', scripts + python)) | {NO_SCRIPT}
+    assert used == set(FRENCH)
+    assert all(FRENCH.values())
+
+
+def test_a_report_speaks_the_language_of_the_session(tmp_path):
+    _, path = written(tmp_path, language="FRAN")
+    assert '<html lang="fr">' in path.read_text(encoding="utf-8")
+    data = data_of(path)
+    assert data["pages"][-1]["title"] == "Environnement"
+    assert data["pages"][-1]["blocks"][0]["head"] == ["Quoi", "Valeur"]
+    assert data["pages"][1]["blocks"][0]["caption"].startswith("Front de Pareto")
+    assert data["words"]["edges"] == "arêtes"
+    _, path = written(tmp_path, language="ANGL")
+    assert '<html lang="en">' in path.read_text(encoding="utf-8")
+    assert data_of(path)["words"] == {}
 
 
 # ---------------------------------------------------------------- in a browser
@@ -298,6 +327,20 @@ def test_a_printed_report_has_every_page_and_its_views(page):
     assert min(page.value(inside)) >= 2
     assert (picture(drawn)[..., :3].min(axis=2) < 0.97).mean() > 0.05
     assert page.value("[...document.querySelectorAll('section')].map((s) => s.hidden)") == [False, True, True, True]
+
+
+def test_buttons_and_hints_are_in_french_where_the_session_is(page, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    _, path = written(other, language="FRAN")
+    page.open(path, f"location.pathname.startsWith('{other.as_posix()}') && gibiane.data !== null")
+    page.value("gibiane.open(2)")
+    page.wait("gibiane.views.block.camera.width > 100")
+    bar = page.value("document.querySelector('.tools').textContent")
+    assert "voir à travers" in bar
+    assert "déplacements" in bar
+    assert not re.search("edges|fit|drag", bar)
+    assert "sur le front de Pareto" in page.value("(gibiane.open(1), gibiane.charts.cost.record(1, 2))")
 
 
 def test_one_changed_measure_moves_its_point_and_the_front(page, tmp_path):

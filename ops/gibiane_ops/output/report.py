@@ -9,7 +9,7 @@ from gibiane.builtins.text import output_path
 from gibiane.forms import Key
 from gibiane.registry import Context, Refused, extend
 from gibiane.values import MOT, TABLE, Table, type_of
-from gibiane_ops.kernels.report import Page, environment_rows, write_report
+from gibiane_ops.kernels.report import Page, environment_rows, said, write_report
 from gibiane_ops.kernels.report import Table as Rows
 from gibiane_ops.output.report_blocks import Place, block_of
 from gibiane_ops.values.failures import worded
@@ -35,16 +35,17 @@ def _sort_html(ctx: Context, q: Operands) -> Any:
     title = _text(ctx, table, "TITRE", "Gibiane")
     subtitle = _text(ctx, table, "SOUSTITRE", "")
     pages = _pages(ctx, table)
+    language = ctx.session.lang
     if not table.has("ENVIRONNEMENT") or table.get("ENVIRONNEMENT") is not False:
         rows = Rows(
-            head=["What", "Value"],
-            rows=environment_rows(),
-            caption="What this report was made with: measured times hold for this machine.",
+            head=[said("What", language), said("Value", language)],
+            rows=environment_rows(language),
+            caption=said("What this report was made with: measured times hold for this machine.", language),
         )
-        pages.append(Page(title="Environment", blocks=[rows]))
+        pages.append(Page(title=said("Environment", language), blocks=[rows]))
     try:
         with worded(ctx, at="t"):
-            write_report(path, title, subtitle, pages)
+            write_report(path, title, subtitle, pages, language)
     except OSError as failure:
         ctx.cannot_write(path, failure)
     if ctx.option("ECHO") >= 1:

@@ -15,6 +15,7 @@ from gibiane_ops.kernels.report.blocks import (
     pareto_front,
 )
 from gibiane_ops.kernels.report.environment import environment_rows
+from gibiane_ops.kernels.report.words import said
 from gibiane_ops.kernels.report.writing import write_report
 
 __all__ = [
@@ -31,5 +32,6 @@ __all__ = [
     "View",
     "environment_rows",
     "pareto_front",
+    "said",
     "write_report",
 ]

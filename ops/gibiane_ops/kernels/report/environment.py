@@ -8,11 +8,17 @@ import sys
 from datetime import UTC, datetime
 from importlib import metadata
 
+from gibiane_ops.kernels.report.words import said
+
 PACKAGES = ("gibiane", "numpy", "scipy", "gmsh", "meshio", "rslab", "pyamg", "pypardiso", "matplotlib", "pyvista")
 
 
-def environment_rows() -> list[tuple[str, str]]:
+def environment_rows(language: str = "en") -> list[tuple[str, str]]:
     """List what a reader needs to judge measured times, and to do the run again.
+
+    Parameters
+    ----------
+    language : {'en', 'fr'}
 
     Returns
     -------
@@ -20,21 +26,21 @@ def environment_rows() -> list[tuple[str, str]]:
         Name and value: date, machine, cores and memory, threads, versions of Python and of the packages that are here.
     """
     rows = [
-        ("Date (UTC)", datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")),
-        ("System", platform.platform()),
-        ("Processor", _processor()),
-        ("Cores", str(os.cpu_count() or "unknown")),
+        (said("Date (UTC)", language), datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%S")),
+        (said("System", language), platform.platform()),
+        (said("Processor", language), _processor()),
+        (said("Cores", language), str(os.cpu_count() or said("unknown", language))),
     ]
     memory = _memory()
     if memory:
-        rows.append(("Memory", f"{memory / 2**30:.1f} GiB"))
+        rows.append((said("Memory", language), f"{memory / 2**30:.1f} GiB"))
     rows += [(name, os.environ[name]) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS") if name in os.environ]
     rows.append(("Python", sys.version.split()[0]))
     for name in PACKAGES:
         try:
             rows.append((name, metadata.version(name)))
         except metadata.PackageNotFoundError:
-            rows.append((name, "not installed"))
+            rows.append((name, said("not installed", language)))
     return rows
 
 

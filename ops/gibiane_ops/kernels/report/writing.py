@@ -15,11 +15,14 @@ import numpy as np
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.report.blocks import Block, Chart, Page, Picture, Table, Text, View, pareto_front
+from gibiane_ops.kernels.report.words import FRENCH, said
+
+NO_SCRIPT = "This report needs JavaScript, which is inside this file; nothing is fetched from a network."
 
 SCRIPTS = ("base.js", "axis.js", "paint.js", "chart.js", "view.js")
 
 
-def write_report(path: Path, title: str, subtitle: str, pages: Sequence[Page]) -> None:
+def write_report(path: Path, title: str, subtitle: str, pages: Sequence[Page], language: str = "en") -> None:
     """Write a report.
 
     Parameters
@@ -29,6 +32,8 @@ def write_report(path: Path, title: str, subtitle: str, pages: Sequence[Page]) -
     title, subtitle : str
     pages : sequence of Page
         At least one.
+    language : {'en', 'fr'}
+        Of buttons and hints.
 
     Raises
     ------
@@ -50,18 +55,22 @@ def write_report(path: Path, title: str, subtitle: str, pages: Sequence[Page]) -
     if not pages:
         raise BadValue("report", "without a page", "at least one page")
     _check_names(pages)
-    data = {"title": title, "pages": [{"title": p.title, "blocks": [_plain(b) for b in p.blocks]} for p in pages]}
+    data = {
+        "title": title,
+        "words": FRENCH if language == "fr" else {},
+        "pages": [{"title": p.title, "blocks": [_plain(b, language) for b in p.blocks]} for p in pages],
+    }
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(_html(title, subtitle, data), encoding="utf-8")
+    path.write_text(_html(title, subtitle, data, language), encoding="utf-8")
 
 
-def _html(title: str, subtitle: str, data: dict[str, Any]) -> str:
+def _html(title: str, subtitle: str, data: dict[str, Any], language: str) -> str:
     folder = resources.files("gibiane_ops.kernels.report") / "page"
     # "</script>" inside a text would end the data: no "<" is left in them
     content = json.dumps(data, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     scripts = "\n".join(f"<script>\n{(folder / name).read_text(encoding='utf-8')}</script>" for name in SCRIPTS)
     return f"""<!DOCTYPE html>
-<html lang="en">
+<html lang="{language}">
 <head>
 <meta charset="utf-8">
 <meta name="color-scheme" content="light dark">
@@ -73,7 +82,7 @@ def _html(title: str, subtitle: str, data: dict[str, Any]) -> str:
 </head>
 <body>
 <header><h1>{escape(title)}</h1><p>{escape(subtitle)}</p><nav role="tablist"></nav></header>
-<noscript>This report needs JavaScript, which is inside this file; nothing is fetched from a network.</noscript>
+<noscript>{escape(said(NO_SCRIPT, language))}</noscript>
 <main></main>
 <script type="application/json" id="data">{content}</script>
 {scripts}
@@ -92,7 +101,7 @@ def _check_names(pages: Sequence[Page]) -> None:
                 seen.add((type(block), block.name))
 
 
-def _plain(block: Block) -> dict[str, Any]:
+def _plain(block: Block, language: str) -> dict[str, Any]:
     """Turn a block into what JSON can hold."""
     common = {"title": block.title, "caption": block.caption}
     match block:
@@ -104,7 +113,7 @@ def _plain(block: Block) -> dict[str, Any]:
             source = f"data:image/{block.kind};base64,{base64.b64encode(block.data).decode('ascii')}"
             return common | {"kind": "picture", "source": source}
         case Chart():
-            return common | _chart(block)
+            return common | _chart(block, language)
         case View():
             return common | _view(block)
 
@@ -121,7 +130,7 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _chart(chart: Chart) -> dict[str, Any]:
+def _chart(chart: Chart, language: str) -> dict[str, Any]:
     for curve in chart.curves:
         if len(curve.x) != len(curve.y):
             raise BadValue(
@@ -137,7 +146,7 @@ def _chart(chart: Chart) -> dict[str, Any]:
     caption = chart.caption
     if names:
         caption = f"{caption}\n" if caption else ""
-        caption += "Pareto front (dashed), by increasing abscissa: " + " – ".join(names)
+        caption += said("Pareto front (dashed), by increasing abscissa:", language) + " " + " – ".join(names)
     return {
         "kind": "chart",
         "id": chart.name,

@@ -33,6 +33,9 @@ const brief = (value, digits = 4) => {
   return String(Number(value.toPrecision(digits)));
 };
 
+// buttons and hints in the language of the report
+const said = (text) => gibiane.data.words[text] ?? text;
+
 const tip = {
   node: null,
   show(text, x, y) {
@@ -85,7 +88,7 @@ const NUMBER = /^[+-]?\d*\.?\d+(?:e[+-]?\d+)?$/i;
 // the value of a cell for sorting: words that spell a number (its digits were chosen by the script) are numbers
 const worth = (cell) => (typeof cell === "string" ? (NUMBER.test(cell.trim()) ? Number(cell) : NaN) : (cell ?? NaN));
 
-const VERDICTS = { OK: "good", VRAI: "good", STANDS: "good", FAIL: "bad", FAILED: "bad", ECHEC: "bad", FAUX: "bad" };
+const VERDICTS = { OK: "good", VRAI: "good", STANDS: "good", FAIL: "bad", FAILED: "bad", ECHEC: "bad", "ÉCHEC": "bad", FAUX: "bad" };
 
 const BLOCKS = {
   text: (block) => make("p", {}, block.text),
@@ -121,7 +124,7 @@ const BLOCKS = {
       fill([...block.rows].sort((a, b) => turn * compare(a[j], b[j])));
     };
     const heads = block.head.map((name, j) => make("th", {
-      ...(numeric[j] ? { class: "number" } : {}), title: "sort", tabindex: "0", onclick: () => sort(j), onkeydown: (event) => event.key === "Enter" && sort(j),
+      ...(numeric[j] ? { class: "number" } : {}), title: said("sort"), tabindex: "0", onclick: () => sort(j), onkeydown: (event) => event.key === "Enter" && sort(j),
     }, name));
     return make("div", { class: "scroll" }, make("table", {}, make("thead", {}, make("tr", {}, ...heads)), body));
   },

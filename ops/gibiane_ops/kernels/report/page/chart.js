@@ -22,7 +22,7 @@ class Chart {
     this.block = block;
     this.off = new Set();
     this.style = this.styles();
-    this.svg = svg("svg", { role: "img", tabindex: "0", "aria-label": `chart: ${block.title || block.ytitle}` });
+    this.svg = svg("svg", { role: "img", tabindex: "0", "aria-label": `${said("chart")}: ${block.title || block.ytitle}` });
     this.legend = make("div", { class: "legend" });
     this.node = make("div", { class: "chart" }, this.svg, this.legend);
     gibiane.charts[block.id] = this;
@@ -123,7 +123,7 @@ class Chart {
   }
   drawLegend() {
     this.legend.replaceChildren(...this.block.curves.map((curve, k) => make("button", {
-      type: "button", class: this.off.has(k) ? "entry off" : "entry", title: "click: hide or show", "aria-pressed": String(!this.off.has(k)), onclick: () => this.toggle(k),
+      type: "button", class: this.off.has(k) ? "entry off" : "entry", title: said("click: hide or show"), "aria-pressed": String(!this.off.has(k)), onclick: () => this.toggle(k),
     }, svg("svg", { width: 34, height: 14, viewBox: "-17 -7 34 14", "aria-hidden": "true" }, ...(curve.line ? [this.line(k, "M-17 0H17")] : []), this.mark(k, {})), curve.name)));
   }
   toggle(k) {
@@ -136,7 +136,7 @@ class Chart {
     const curve = this.block.curves[k];
     const on = (this.block.pareto ?? []).some(([a, b]) => a === k && b === i);
     const lines = [curve.name, `${this.block.xtitle || "x"}: ${brief(curve.x[i], 6)}`, `${this.block.ytitle || "y"}: ${brief(curve.y[i], 6)}`];
-    if (on) lines.push("on the Pareto front");
+    if (on) lines.push(said("on the Pareto front"));
     for (const [name, value] of curve.notes[i] ?? []) lines.push(name ? `${name}: ${value}` : value);
     return lines.join("\n");
   }

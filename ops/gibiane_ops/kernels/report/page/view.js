@@ -133,26 +133,26 @@ class View {
     const button = (text, title, action) => make("button", { type: "button", title, onclick: () => { action(); this.draw(); } }, text);
     const bar = make("div", { class: "tools" });
     if (this.fields.length > 1)
-      bar.append(make("select", { title: "field", onchange: (event) => this.show(Number(event.target.value)) }, ...this.fields.map((f, k) => make("option", { value: k }, f.name))));
+      bar.append(make("select", { title: said("field"), onchange: (event) => this.show(Number(event.target.value)) }, ...this.fields.map((f, k) => make("option", { value: k }, f.name))));
     bar.append(
-      button("fit", "the whole object", () => this.camera.home()),
-      button("x", "seen along x", () => this.camera.turn(0, 0)),
-      button("y", "seen along -y", () => this.camera.turn(-90, 0)),
-      button("z", "seen from above", () => this.camera.turn(-90, 90)),
-      button("-z", "seen from below", () => this.camera.turn(-90, -90)),
-      make("label", {}, make("input", { type: "checkbox", checked: "", onchange: (event) => { this.withEdges = event.target.checked; this.draw(); } }), "edges"),
-      make("label", {}, make("input", { type: "checkbox", onchange: (event) => { this.glassy = event.target.checked; this.draw(); } }), "see through"));
+      button(said("fit"), said("the whole object"), () => this.camera.home()),
+      button("x", said("seen along x"), () => this.camera.turn(0, 0)),
+      button("y", said("seen along -y"), () => this.camera.turn(-90, 0)),
+      button("z", said("seen from above"), () => this.camera.turn(-90, 90)),
+      button("-z", said("seen from below"), () => this.camera.turn(-90, -90)),
+      make("label", {}, make("input", { type: "checkbox", checked: "", onchange: (event) => { this.withEdges = event.target.checked; this.draw(); } }), said("edges")),
+      make("label", {}, make("input", { type: "checkbox", onchange: (event) => { this.glassy = event.target.checked; this.draw(); } }), said("see through")));
     if (this.moved) {
-      const label = make("span", {}, `displacements × ${brief(this.factor)}`);
-      const slider = make("input", { type: "range", min: 0, max: 2, step: 0.05, value: 1, "aria-label": "amplification" });
+      const label = make("span", {}, `${said("displacements")} × ${brief(this.factor)}`);
+      const slider = make("input", { type: "range", min: 0, max: 2, step: 0.05, value: 1, "aria-label": said("amplification") });
       slider.addEventListener("input", () => {
         this.factor = this.block.factor * Number(slider.value);
-        label.textContent = `displacements × ${brief(this.factor)}`;
+        label.textContent = `${said("displacements")} × ${brief(this.factor)}`;
         this.draw();
       });
       bar.append(make("label", {}, slider, label));
     }
-    bar.append(make("span", {}, "drag: turn · click, then wheel: zoom · right button: move · pointer: values"));
+    bar.append(make("span", {}, said("drag: turn · click, then wheel: zoom · right button: move · pointer: values")));
     return bar;
   }
   // a field by its number: new colours and a new legend
@@ -319,10 +319,10 @@ class View {
   }
   report(px, py) {
     const arrow = this.arrowNear(px, py), found = this.pick(px, py), lines = [];
-    if (arrow) lines.push(`${arrow.label}: (${arrow.vector.map((v) => brief(v)).join("  ")}), length ${brief(Math.hypot(...arrow.vector))}`);
+    if (arrow) lines.push(`${arrow.label}: (${arrow.vector.map((v) => brief(v)).join("  ")}), ${said("length")} ${brief(Math.hypot(...arrow.vector))}`);
     if (found) {
-      lines.push(`element ${found.element} · nearest corner: node ${found.node} (${found.position.map((v) => brief(v, 5)).join("  ")})`);
-      if (found.field !== undefined) lines.push(`${found.field} = ${brief(found.value, 6)}${found.atNode === undefined ? " in the element" : ` here, ${brief(found.atNode, 6)} at the node`}`);
+      lines.push(`${said("element")} ${found.element} · ${said("nearest corner: node")} ${found.node} (${found.position.map((v) => brief(v, 5)).join("  ")})`);
+      if (found.field !== undefined) lines.push(`${found.field} = ${brief(found.value, 6)}${found.atNode === undefined ? ` ${said("in the element")}` : ` ${said("here")}, ${brief(found.atNode, 6)} ${said("at the node")}`}`);
     }
     return lines.join("\n");
   }
