@@ -114,9 +114,13 @@ def test_the_environment_names_the_machine_and_the_versions(tmp_path):
 
 def test_every_word_of_the_page_has_a_french_one():
     folder = resources.files("gibiane_ops.kernels.report")
-    scripts = "".join(each.read_text(encoding="utf-8") for each in (folder / "page").iterdir() if each.name[-3:] == ".js")
+    scripts = "".join(
+        each.read_text(encoding="utf-8") for each in (folder / "page").iterdir() if each.name[-3:] == ".js"
+    )
     python = "".join(
-        each.read_text(encoding="utf-8") for each in folder.iterdir() if each.name[-3:] == ".py" and each.name != "words.py"
+        each.read_text(encoding="utf-8")
+        for each in folder.iterdir()
+        if each.name[-3:] == ".py" and each.name != "words.py"
     )
     python += (resources.files("gibiane_ops.output") / "report.py").read_text(encoding="utf-8")
     used = set(re.findall(r'said\("([^"]+)"', scripts + python)) | {NO_SCRIPT}

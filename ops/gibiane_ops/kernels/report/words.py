@@ -29,13 +29,13 @@ FRENCH = {
     "here": "ici",
     "at the node": "au noeud",
     "Pareto front (dashed), by increasing abscissa:": "Front de Pareto (tirets), par abscisse croissante :",
-    "This report needs JavaScript, which is inside this file; nothing is fetched from a network.": "Ce rapport demande "
-    "JavaScript, qui est dans ce fichier ; rien ne vient d'un réseau.",
+    "This report needs JavaScript, which is inside this file; nothing is fetched from a network.": "Ce rapport a besoin "
+    "de JavaScript, qui est dans ce fichier ; rien ne vient d'un réseau.",
     "Environment": "Environnement",
     "What": "Quoi",
     "Value": "Valeur",
-    "What this report was made with: measured times hold for this machine.": "Avec quoi ce rapport a été fait : les temps "
-    "mesurés valent pour cette machine.",
+    "What this report was made with: measured times hold for this machine.": "Avec quoi ce rapport a été fait : les "
+    "temps mesurés valent pour cette machine.",
     "Date (UTC)": "Date (UTC)",
     "System": "Système",
     "Processor": "Processeur",
