@@ -20,8 +20,8 @@ FRENCH = {
     "see through": "voir à travers",
     "displacements": "déplacements",
     "amplification": "amplification",
-    "drag: turn · click, then wheel: zoom · right button: move · pointer: values": "glisser : tourner · cliquer, puis molette : "
-    "grossir · bouton droit : déplacer · pointeur : valeurs",
+    "drag: turn · click, then wheel: zoom · right button: move · pointer: values": "glisser : tourner · cliquer, "
+    "puis molette : grossir · bouton droit : déplacer · pointeur : valeurs",
     "length": "longueur",
     "element": "élément",
     "nearest corner: node": "sommet le plus proche : noeud",
@@ -29,8 +29,8 @@ FRENCH = {
     "here": "ici",
     "at the node": "au noeud",
     "Pareto front (dashed), by increasing abscissa:": "Front de Pareto (tirets), par abscisse croissante :",
-    "This report needs JavaScript, which is inside this file; nothing is fetched from a network.": "Ce rapport a besoin "
-    "de JavaScript, qui est dans ce fichier ; rien ne vient d'un réseau.",
+    "This report needs JavaScript, which is inside this file; nothing is fetched from a network.": "Ce rapport a "
+    "besoin de JavaScript, qui est dans ce fichier ; rien ne vient d'un réseau.",
     "Environment": "Environnement",
     "What": "Quoi",
     "Value": "Valeur",
