@@ -14,7 +14,7 @@ from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissib
 from gibiane_ops.kernels.estimate.fields import Field, field_of
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.kernels.estimate.macro import STATIC
-from gibiane_ops.kernels.estimate.pieces import Aim, aim_of, balanced_stress, joined_aims, uniform_aim
+from gibiane_ops.kernels.estimate.pieces import Source, balanced_stress, uniform_aim
 from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
 from gibiane_ops.kernels.estimate.zz import SolidError
@@ -112,7 +112,7 @@ def equilibrated(
         for z, v in zip(zones, values, strict=True)
     ]
     law = np.concatenate([each[owner] for each, owner in zip(laws, pieces.cutting.owner, strict=True)])
-    aim = None
+    aim, source = None, None
     with worded(ctx, at="model"):
         mesh = simplices(points, cells)
         traction, free = _on_boundary(side, mesh.nodes[mesh.boundary])
@@ -122,7 +122,8 @@ def equilibrated(
             aim = None if nodal else uniform_aim(sigma[:, STATIC[dim]], dim)
         else:
             fields = [_field(ctx, *each, stress.support) for each in zip(zones, values, laws, strict=True)]
-            aim = _aim(pieces, mesh, fields, plane_compliance(law, dim))
+            source = _source(pieces, fields)
+            aim = source.aim(mesh.points[mesh.cells], plane_compliance(law, dim))
             sigma = np.zeros((len(cells), law.shape[1]))
             sigma[:, STATIC[dim]] = aim.mean
         if aim is not None:
@@ -131,7 +132,9 @@ def equilibrated(
             with worded(ctx, at="sig"):
                 sigma = balanced_stress(mesh, sigma, law, loads, held)
         try:
-            return admissible_stress(points, cells, sigma, law, loads, sweeps=count, mesh=mesh, aim=aim, joint=joint)
+            return admissible_stress(
+                points, cells, sigma, law, loads, sweeps=count, mesh=mesh, aim=aim, source=source, joint=joint
+            )
         except NotEquilibrated as failure:
             _unbalanced(ctx, pieces.nodes[pieces.cutting.near[failure.nodes]], failure.forces)
 
@@ -202,16 +205,12 @@ def _field(ctx: Context, zone: ModelZone, values: FloatArray, law: FloatArray, s
     return field_of(of, node_store(ctx).coords[zone.cells][:, :, :dim], strain)
 
 
-def _aim(pieces: Pieces, mesh: Simplices, fields: list[Field], compliance: FloatArray) -> Aim:
-    """Describe the stress of the elements on their pieces, the corners in the order of the mesh of simplices."""
-    order = np.argsort(pieces.cutting.cells, axis=1)
-    at = np.take_along_axis(pieces.cutting.at, order[:, :, None], axis=1)
-    found, start = [], 0
-    for field, owner in zip(fields, pieces.cutting.owner, strict=True):
-        some = slice(start, start + len(owner))
-        found.append(aim_of(field, owner, at[some], mesh.points[mesh.cells[some]], compliance[some]))
-        start += len(owner)
-    return joined_aims(found)
+def _source(pieces: Pieces, fields: list[Field]) -> Source:
+    """Return where the stress on the pieces comes from, their corners in the order of the mesh of simplices."""
+    owner = pieces.cutting.owner
+    block = np.repeat(np.arange(len(owner)), [len(each) for each in owner])
+    found = Source(fields, block, np.concatenate(owner), pieces.cutting.at)
+    return found.turned(np.argsort(pieces.cutting.cells, axis=1))
 
 
 def _held(pieces: Pieces, mesh: Simplices, free: FloatArray, at_nodes: FloatArray) -> FloatArray:

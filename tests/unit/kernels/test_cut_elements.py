@@ -14,7 +14,7 @@ from gibiane_ops.kernels.estimate.cutting import CENTRES, CORNERS, MIDDLES, Cutt
 from gibiane_ops.kernels.estimate.equilibrium import stress_at_corners
 from gibiane_ops.kernels.estimate.fields import field_of
 from gibiane_ops.kernels.estimate.macro import STATIC
-from gibiane_ops.kernels.estimate.pieces import aim_of, balanced_stress
+from gibiane_ops.kernels.estimate.pieces import Source, balanced_stress
 from gibiane_ops.kernels.estimate.simplices import simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
 from gibiane_ops.kernels.materials import isotropic
@@ -158,10 +158,8 @@ def test_identity(name, finest, skew):
     compliance = np.broadcast_to(plane_compliance(law, dim), (m, *[len(STATIC[dim])] * 2))
     order = np.argsort(cutting.cells, axis=1)
     field = field_of(of, points[cells], given)
-    aim = aim_of(
-        field, cutting.owner[0], np.take_along_axis(cutting.at, order[:, :, None], axis=1),
-        pieces.points[pieces.cells], compliance,
-    )  # fmt: skip
+    source = Source([field], np.zeros(m, np.int64), cutting.owner[0], cutting.at).turned(order)
+    aim = source.aim(pieces.points[pieces.cells], compliance)
     edge = pieces.boundary
     outward = pieces.outward[pieces.cell[edge, 0], pieces.local[edge, 0]]
     outward = outward / np.linalg.norm(outward, axis=1)[:, None]

@@ -12,7 +12,7 @@ from gibiane_ops.kernels.estimate.equilibrium import equilibrium_residual
 from gibiane_ops.kernels.estimate.improve import improve
 from gibiane_ops.kernels.estimate.joints import Joined, Joint
 from gibiane_ops.kernels.estimate.macro import STATIC
-from gibiane_ops.kernels.estimate.pieces import Aim, uniform_aim
+from gibiane_ops.kernels.estimate.pieces import Aim, Source, uniform_aim
 from gibiane_ops.kernels.estimate.regions import LAYERS, grown, regions
 from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
 from gibiane_ops.kernels.estimate.target import Target
@@ -106,6 +106,7 @@ def admissible_stress(
     sweeps: int = SWEEPS,
     mesh: Simplices | None = None,
     aim: Aim | None = None,
+    source: Source | None = None,
     joint: Joint | None = None,
 ) -> Admissible:
     """Build a stress in equilibrium with the loads, near a finite-element stress, and measure their distance.
@@ -122,13 +123,14 @@ def admissible_stress(
     exterior : Exterior
         Loads and supports, on the sides ``simplices(points, cells).boundary``.
     sweeps : int
-        Improvements; from the second on also with smaller cells where much is left, unless the finite-element stress is
-        not uniform in the cells.
+        Improvements; from the second on also with smaller cells where much is left.
     mesh : Simplices, optional
         That of the same points and cells, when it is at hand.
     aim : Aim, optional
         The finite-element stress to which the distance is taken, when the cells are pieces of its elements; `stress`
         then only has to balance the loads at the nodes.
+    source : Source, optional
+        Where the aim comes from, when it is not uniform in the cells.
     joint : Joint, optional
         Contact facets whose tractions, given with the loads, may be improved too within the law.
 
@@ -171,7 +173,7 @@ def admissible_stress(
     given[mesh.boundary] = exterior.traction * np.linalg.norm(edge, axis=1)[:, None, None]
     compliance = np.broadcast_to(plane_compliance(law, dim), (len(cells), sigma.shape[1], sigma.shape[1]))
     whole = uniform_aim(sigma, dim) if aim is None else aim
-    target = Target(mesh, whole, compliance, exterior.body, free, given, np.arange(len(cells)))
+    target = Target(mesh, whole, compliance, exterior.body, free, given, np.arange(len(cells)), source=source)
     if joint is not None and len(joint.closed):
         target, tau = Joined(mesh, joint).target(target, tau)
 
@@ -185,7 +187,7 @@ def admissible_stress(
     history = [estimate()]
     for turn in range(sweeps):
         before = len(target.cell)
-        if turn and not target.aim.pull.any():
+        if turn and (target.source is not None or not target.aim.pull.any()):
             target, tau = _zoomed(target, tau)
         cut = regions(target.mesh, turn)
         # the least of a whole mesh is found already

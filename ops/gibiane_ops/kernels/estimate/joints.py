@@ -133,6 +133,7 @@ class Joined:
             given=given,
             limits=limits,
             facet=facet,
+            source=None if separate.source is None else separate.source.turned(self.order),
         )
         square = float(found.distance(together).sum())
         return replace(found, limits=limits.spending(square) if self.mesh.dim == 3 else limits), together

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 
 import numpy as np
@@ -59,52 +59,97 @@ def uniform_aim(stress: FloatArray, dim: int) -> Aim:
     return Aim(stress, np.zeros((len(stress), macro_element(dim).n_tractions)), np.zeros(len(stress)))
 
 
-def joined_aims(parts: list[Aim]) -> Aim:
-    """Put aims one after the other; those that need no check are their own."""
-    mean, pull, constant = (
-        np.concatenate(each) for each in zip(*[(a.mean, a.pull, a.constant) for a in parts], strict=True)
-    )
-    if all(a.check is None for a in parts):
-        return Aim(mean, pull, constant)
-    return Aim(
-        mean, pull, constant, joined_aims([Aim(b.mean, b.pull, b.constant) for b in (a.check or a for a in parts)])
-    )
-
-
-def aim_of(field: Field, owner: IntArray, at: FloatArray, corners: FloatArray, compliance: FloatArray) -> Aim:
-    """Describe the stress of elements on their simplices.
-
-    Parameters
-    ----------
-    field : Field
-    owner : (k,) int64
-        Element of each simplex.
-    at : (k, d + 1, d) float64
-        Reference coordinates of the corners of the simplices.
-    corners : (k, d + 1, d) float64, length
-        These corners, in the order of the mesh of simplices.
-    compliance : (k, n_s, n_s) float64
-        Uniform in each simplex.
-
-    Returns
-    -------
-    Aim
-
-    Notes
-    -----
-    Exact where the maps of the elements are affine: the stress is of degree one (TRI6, TE10, QUA4, PRI6), two (QUA8,
-    CUB8, PR15) or three (CU20) in the simplices. Elsewhere it is rational, and a coarser rule tells how well a finer
-    one integrates it.
-    """
-    bent = ~field.affine[owner]
-    exact, first, second = _rules(field)
-    found = _integrated(field, owner, at, corners, compliance, exact if not bent.any() else first)
-    if not bent.any():
+def carried(aim: Aim, root: IntArray, rows: IntArray, there: Aim) -> Aim:
+    """Take the aims of simplices, (k,) each, but for some `rows` of them, which have their own."""
+    found = Aim(aim.mean[root], aim.pull[root], aim.constant[root])
+    found.mean[rows], found.pull[rows], found.constant[rows] = there.mean, there.pull, there.constant
+    if aim.check is None and there.check is None:
         return found
-    check = Aim(found.mean.copy(), found.pull.copy(), found.constant.copy())
-    again = _integrated(field, owner[bent], at[bent], corners[bent], compliance[bent], second)
-    check.mean[bent], check.pull[bent], check.constant[bent] = again.mean, again.pull, again.constant
-    return Aim(found.mean, found.pull, found.constant, check)
+    return replace(found, check=carried(aim.check or aim, root, rows, there.check or there))
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """Where the stress on simplices comes from, so that it is known on parts of them too.
+
+    Attributes
+    ----------
+    fields : list of Field
+        Of each block of elements.
+    block, element : (k,) int64
+        Block and element of each simplex.
+    at : (k, d + 1, d) float64
+        Corners of the simplices in reference coordinates of the elements.
+    """
+
+    fields: list[Field]
+    block: IntArray
+    element: IntArray
+    at: FloatArray
+
+    def turned(self, order: IntArray) -> Source:
+        """Return the same with the corners of each simplex in another order, (k, d + 1)."""
+        return replace(self, at=np.take_along_axis(self.at, order[:, :, None], axis=1))
+
+    def parts(self, root: IntArray, share: FloatArray) -> Source:
+        """Return that of parts of simplices.
+
+        Parameters
+        ----------
+        root : (n,) int64
+            Simplex of each part.
+        share : (n, d + 1, d + 1) float64
+            Barycentric coordinates of the corners of each part in the simplex.
+        """
+        return Source(self.fields, self.block[root], self.element[root], np.matmul(share, self.at[root]))
+
+    def aim(self, corners: FloatArray, compliance: FloatArray, rows: IntArray | None = None) -> Aim:
+        """Describe the stress on simplices.
+
+        Parameters
+        ----------
+        corners : (k, d + 1, d) float64, length
+            Of all the simplices.
+        compliance : (k, n_s, n_s) float64
+            Uniform in each simplex.
+        rows : (n,) int64, optional
+            Those that are asked for.
+
+        Returns
+        -------
+        Aim
+
+        Notes
+        -----
+        Exact where the maps of the elements are affine: the stress is of degree one (TRI6, TE10, QUA4, PRI6), two
+        (QUA8, CUB8, PR15) or three (CU20) in the simplices. Elsewhere it is rational, and a coarser rule tells how well
+        a finer one integrates it.
+        """
+        rows = np.arange(len(corners)) if rows is None else rows
+        dim, n_s = corners.shape[2], compliance.shape[1]
+        found, check = (_empty(len(rows), dim, n_s) for _ in range(2))
+        checked = False
+        for number, field in enumerate(self.fields):
+            mine = np.flatnonzero(self.block[rows] == number)
+            bent = ~field.affine[self.element[rows[mine]]]
+            exact, fine, coarse = _rules(field)
+            for some, rule, into in (
+                (mine[~bent], exact, found),
+                (mine[bent], fine, found),
+                (mine[bent], coarse, check),
+            ):
+                at = rows[some]
+                each = _integrated(field, self.element[at], self.at[at], corners[at], compliance[at], rule)
+                into.mean[some], into.pull[some], into.constant[some] = each.mean, each.pull, each.constant
+            straight = mine[~bent]
+            for name in ("mean", "pull", "constant"):
+                getattr(check, name)[straight] = getattr(found, name)[straight]
+            checked = checked or bool(bent.any())
+        return replace(found, check=check) if checked else found
+
+
+def _empty(k: int, dim: int, n_s: int) -> Aim:
+    return Aim(np.empty((k, n_s)), np.empty((k, macro_element(dim).n_tractions)), np.empty(k))
 
 
 def _rules(field: Field) -> tuple[Rule, Rule, Rule]:
@@ -126,7 +171,7 @@ def _integrated(
     macro = macro_element(dim)
     inside = shape("TRI3" if dim == 2 else "TET4").N(rule.points)
     weight = rule.weights * factorial(dim) / n
-    found = Aim(np.empty((len(owner), n_s)), np.empty((len(owner), macro.n_tractions)), np.empty(len(owner)))
+    found = _empty(len(owner), dim, n_s)
     parts = np.repeat(np.eye(n)[None], n, axis=0)
     parts[range(n), range(n)] = 1.0 / n
     bary = np.einsum("qp,kpc->kqc", inside, parts).reshape(-1, n)

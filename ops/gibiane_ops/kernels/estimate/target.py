@@ -10,7 +10,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.equilibrium import equilibrium_residual, errors
 from gibiane_ops.kernels.estimate.forms import jumps
 from gibiane_ops.kernels.estimate.limits import Limits
-from gibiane_ops.kernels.estimate.pieces import Aim
+from gibiane_ops.kernels.estimate.pieces import Aim, Source
 from gibiane_ops.kernels.estimate.simplices import Simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
 
@@ -36,6 +36,8 @@ class Target:
         Sides on which tractions obey the law of contact and friction; they do to begin with, and go on to.
     facet : (n_sides,) int64, optional
         Contact facet that each of these sides is a part of; -1 elsewhere.
+    source : Source, optional
+        Where the finite-element stress comes from when it is not uniform in the cells.
     """
 
     mesh: Simplices
@@ -47,6 +49,7 @@ class Target:
     cell: IntArray
     limits: Limits | None = None
     facet: IntArray | None = None
+    source: Source | None = None
 
     def distance(self, tau: FloatArray, sign: float = 1.0) -> FloatArray:
         """Integrate the energy of ``sigma_hat - sign sigma_h`` over each cell, (m,) float64, with what this may leave.

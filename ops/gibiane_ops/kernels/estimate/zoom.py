@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.limits import Limits
 from gibiane_ops.kernels.estimate.macro import contraction, moments
-from gibiane_ops.kernels.estimate.pieces import Aim
+from gibiane_ops.kernels.estimate.pieces import Aim, Source, carried
 from gibiane_ops.kernels.estimate.simplices import Simplices, oriented, others, simplices, slots
 from gibiane_ops.kernels.estimate.target import Target
 from gibiane_ops.kernels.mesh.bisection import Bisection, refined, started
@@ -22,7 +22,6 @@ def zoomed(target: Target, tau: FloatArray, marked: NDArray[np.bool_]) -> tuple[
     Parameters
     ----------
     target : Target
-        Its finite-element stress is uniform in the cells.
     tau : (n_sides, d, d) float64, force
         Balanced tractions.
     marked : (m,) bool
@@ -68,7 +67,7 @@ def _carried(target: Target, tree: Bisection, fine: Simplices) -> Target:
     free[on] = target.free[old]
     given = np.zeros((len(fine.nodes), dim, dim))
     given[on] = (turn * ratio)[:, None, None] * np.matmul(weight[on], target.given[old])
-    aim = Aim(target.aim.mean[root], target.aim.pull[root], target.aim.constant[root])
+    aim, source = _stress(target, root, fine)
     limits, facet = None, None
     if target.limits is not None and target.facet is not None:
         law, n = target.limits, len(fine.nodes)
@@ -93,7 +92,22 @@ def _carried(target: Target, tree: Bisection, fine: Simplices) -> Target:
         cell=target.cell[root],
         limits=limits,
         facet=facet,
+        source=source,
     )
+
+
+def _stress(target: Target, root: IntArray, fine: Simplices) -> tuple[Aim, Source | None]:
+    """Describe the finite-element stress on the smaller cells, which have the compliance of their roots."""
+    whole, source = target.aim, target.source
+    if source is None:
+        return Aim(whole.mean[root], whole.pull[root], whole.constant[root]), None
+    X = fine.points[fine.cells]
+    first = target.mesh.points[target.mesh.cells[root, :1]]
+    inner = np.matmul(X - first, np.linalg.inv(target.mesh.map[root]).swapaxes(1, 2))
+    share = np.concatenate([1 - inner.sum(axis=2, keepdims=True), inner], axis=2)
+    made = np.flatnonzero(np.bincount(root)[root] > 1)
+    smaller = source.parts(root, share)
+    return carried(whole, root, made, smaller.aim(X, target.compliance[root], made)), smaller
 
 
 def _areas(mesh: Simplices) -> FloatArray:
