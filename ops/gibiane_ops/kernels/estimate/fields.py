@@ -9,14 +9,16 @@ from numpy.typing import NDArray
 
 from gibiane_ops.kernels import elasticity, geometry
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.elements.quadratic import LINEAR
 from gibiane_ops.kernels.elements.shape import Shape
+from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotConverged
 from gibiane_ops.kernels.estimate.macro import PAIRS, STATIC
 
 AFFINE = 1e-9
 """Largest change of the jacobian matrix of an element, over its size, for which its map counts as affine."""
 
-INVERSIONS, INVERTED = 50, 1e-13
+INVERSIONS, INVERTED = 50, 1e-12
 """Largest number of Newton steps to a point of an element; distance left that is round-off, over its size."""
 
 RATIONAL = ("PYR5", "PY13")
@@ -34,6 +36,8 @@ class Field:
         Nodes, and displacements that have the strains.
     affine : (m,) bool
         Elements whose map is affine: strains are polynomials there.
+    straight : (m,) bool
+        Elements whose middle nodes are in the middles of their edges: their map is that of the linear shape.
     misfit : float
         Largest difference to the strains given, over the largest of them: round-off for those of a displacement.
     """
@@ -42,6 +46,7 @@ class Field:
     X: FloatArray
     U: FloatArray
     affine: NDArray[np.bool_]
+    straight: NDArray[np.bool_]
     misfit: float
 
     def strains(self, cells: IntArray, x: FloatArray, guess: FloatArray) -> FloatArray:
@@ -68,9 +73,12 @@ class Field:
         """
         k, p, dim = x.shape
         xi = guess.copy()
-        bent = np.flatnonzero(~self.affine[cells])
-        if len(bent):
-            xi[bent] = located(self.of, self.X[cells[bent]], x[bent], guess[bent])
+        linear = shape(LINEAR.get(self.of.name, self.of.name))
+        straight = self.straight[cells]
+        for of, rows in ((linear, straight & ~self.affine[cells]), (self.of, ~straight)):
+            some = np.flatnonzero(rows)
+            if len(some):
+                xi[some] = located(of, self.X[cells[some], : of.n_nodes], x[some], guess[some])
         slope = self.of.dN(xi.reshape(-1, dim)).reshape(k, p, -1, dim).swapaxes(1, 2).reshape(k, -1, p * dim)
         both = np.concatenate([self.X[cells], self.U[cells]], axis=2).swapaxes(1, 2)
         found = np.matmul(both, slope).reshape(k, 2, dim, p, dim)
@@ -149,6 +157,11 @@ def field_of(of: Shape, X: FloatArray, strain: FloatArray) -> Field:
     affine = np.abs(J - J[:, :1]).max(axis=(1, 2, 3)) <= AFFINE * np.abs(J).max(axis=(1, 2, 3))
     if of.name in RATIONAL:
         affine[:] = False
+    straight = np.ones(m, bool)
+    for a, b, *middle in of.edges:
+        if middle:
+            off = np.abs(X[:, middle[0]] - (X[:, a] + X[:, b]) / 2).max(axis=1)
+            straight &= off <= AFFINE * np.abs(X[:, a] - X[:, b]).max(axis=1)
     U, misfit, largest = np.empty(X.shape), 0.0, float(np.abs(strain).max(initial=0.0))
     turns = [(i, j) for i in range(dim) for j in range(i)]
     for start in range(0, m, elasticity.CHUNK):
@@ -169,4 +182,4 @@ def field_of(of: Shape, X: FloatArray, strain: FloatArray) -> Field:
         u = u + np.linalg.solve(A, np.matmul(B.swapaxes(1, 2), given - np.matmul(B, u)))
         misfit = max(misfit, float(np.abs(given - np.matmul(B, u)).max(initial=0.0)))
         U[some] = u[..., 0].reshape(-1, n, dim)
-    return Field(of, X, U, affine, misfit / largest if largest else 0.0)
+    return Field(of, X, U, affine, straight, misfit / largest if largest else 0.0)

@@ -123,7 +123,7 @@ class Source:
         -----
         Exact where the maps of the elements are affine: the stress is of degree one (TRI6, TE10, QUA4, PRI6), two
         (QUA8, CUB8, PR15) or three (CU20) in the simplices. Elsewhere it is rational, and a coarser rule tells how well
-        a finer one integrates it.
+        a finer one integrates it; but for elements with curved sides, on whose chords nothing is exact.
         """
         rows = np.arange(len(corners)) if rows is None else rows
         dim, n_s = corners.shape[2], compliance.shape[1]
@@ -131,10 +131,12 @@ class Source:
         checked = False
         for number, field in enumerate(self.fields):
             mine = np.flatnonzero(self.block[rows] == number)
-            bent = ~field.affine[self.element[rows[mine]]]
+            element = self.element[rows[mine]]
+            bent = ~field.affine[element] & field.straight[element]
             exact, fine, coarse = _rules(field)
             for some, rule, into in (
-                (mine[~bent], exact, found),
+                (mine[field.affine[element]], exact, found),
+                (mine[~field.straight[element]], coarse, found),
                 (mine[bent], fine, found),
                 (mine[bent], coarse, check),
             ):
@@ -154,13 +156,11 @@ def _empty(k: int, dim: int, n_s: int) -> Aim:
 
 def _rules(field: Field) -> tuple[Rule, Rule, Rule]:
     """Return a rule that is exact in elements of affine map, and two for the others, the finer one first."""
-    dim, linear = field.of.dim, field.of.degree == 1
-    if dim == 2:
-        return quadrature.triangle(4), quadrature.simplex(2, 5), quadrature.simplex(2, 4)
-    if field.of.name == "CU20":
-        return quadrature.simplex(3, 4), quadrature.simplex(3, 5), quadrature.simplex(3, 4)
-    table = quadrature.tetrahedron(5)
-    return table, quadrature.simplex(3, 4 if linear else 5), table if linear else quadrature.simplex(3, 4)
+    if field.of.dim == 2:
+        table = quadrature.triangle(4)
+        return table, quadrature.simplex(2, 5), table
+    table, fine = quadrature.tetrahedron(5), quadrature.simplex(3, 4)
+    return fine if field.of.name == "CU20" else table, fine, table
 
 
 def _integrated(
