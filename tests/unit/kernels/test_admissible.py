@@ -171,7 +171,7 @@ def test_equilibrium_and_identity_on_a_quadratic_field(dim, n):
     parts = np.repeat(X[:, None], dim + 1, axis=1)
     parts[:, range(dim + 1), range(dim + 1)] = X.mean(axis=1, keepdims=True)
     true = exact(parts)[..., STATIC[dim]]
-    raw = stress[:, None, None, STATIC[dim]]
+    raw = stress[found.target.cell][:, None, None, STATIC[dim]]
 
     def energy(s: np.ndarray) -> float:
         mass = (np.eye(dim + 1) + 1) / ((dim + 1) * (dim + 2)) / (dim + 1)
