@@ -25,7 +25,7 @@ SWEEPS = 2
 ZOOMS, GROWTH = 10, 1.25
 """Largest number of times that cells are halved, and number of cells above which they no longer are, over the first."""
 
-MARKED, ABOVE = 0.2, 2.0
+MARKED, ABOVE = 0.2, 4.0
 """Share of the squared estimate that the cells to be halved hold, and what each holds at least, over the mean."""
 
 
