@@ -45,6 +45,16 @@ def test_the_short_report_of_the_thesis(tmp_path: Path) -> None:
         rows = browser.value("gibiane.data.pages.find((p) => p.title === 'Published').blocks[1].rows")
         assert len(rows) > 90
         assert [row[0] for row in rows if row[4] and not row[5]] == []
+        # cost charts hold measured errors, hp too; what was estimated stands in a table, with the share that it finds
+        costs = browser.value(
+            "gibiane.data.pages.filter((p) => p.title.startsWith('Cost')).map((p) => "
+            "[p.blocks.find((b) => b.kind === 'chart').curves.map((c) => c.name), p.blocks.at(-1).rows])"
+        )
+        assert len(costs) == 5
+        for names, estimates in costs:
+            assert any(name.endswith("adapted hp") for name in names)
+            assert {row[1] for row in estimates} == {"MOYE", "SPR"}
+            assert all(0 < row[4] < 100 and row[5] == pytest.approx(row[3] / row[4]) for row in estimates)
         assert browser.value("gibiane.errors.length") == 0
         assert browser.complaints == []
     finally:
