@@ -12,8 +12,8 @@ from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, operator
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, LISTMOTS, MAILLAGE, MMODEL, MOT, POINT, RIGIDITE
-from gibiane_ops.kernels.adapt.hanging import hanging_nodes
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.hanging import hanging_nodes
 from gibiane_ops.kernels.mesh.hosts import hosted
 from gibiane_ops.kernels.rigid import dependent_motion
 from gibiane_ops.values.champs import ChPoint

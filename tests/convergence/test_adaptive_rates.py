@@ -10,8 +10,8 @@ import pytest
 import scipy.sparse as sp
 from hanging_relations import relation_matrix
 
-from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, recovery, topology
-from gibiane_ops.kernels.adapt import hanging, hierarchy
+from gibiane_ops.kernels import assembly, elasticity, geometry, hanging, integrals, recovery, topology
+from gibiane_ops.kernels.adapt import hierarchy
 from gibiane_ops.kernels.adapt.orders import singular_orders
 from gibiane_ops.kernels.adapt.sizes import size_map
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC

@@ -11,11 +11,11 @@ from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import geometry, topology
 from gibiane_ops.kernels.adapt.contact_degrees import paired_degrees
-from gibiane_ops.kernels.adapt.hanging import hanging_nodes
 from gibiane_ops.kernels.adapt.hierarchy import Hierarchy, LocalMesh, adapted, faces_in_order, founded
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.hanging import hanging_nodes
 from gibiane_ops.kernels.mesh import unions
 from gibiane_ops.kernels.mesh.hosts import find_hosts
 from gibiane_ops.mesh.building import dimension, explained, join, new_mesh, nodes_of

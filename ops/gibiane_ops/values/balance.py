@@ -9,8 +9,9 @@ import numpy as np
 from gibiane.registry import Context
 from gibiane_ops.kernels import elasticity, geometry, integrals, recovery
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.hanging import hanging_nodes
 from gibiane_ops.kernels.supports import moved
-from gibiane_ops.kernels.topology import middles_on_linear, places_in, used_nodes
+from gibiane_ops.kernels.topology import Block, places_in, used_nodes
 from gibiane_ops.values.champs import MChaml
 from gibiane_ops.values.exterior import Side, held_at, held_directions
 from gibiane_ops.values.maillage import Point
@@ -55,16 +56,25 @@ def unbalanced(
         np.add.at(force, places, side.forces(store.coords[:, :dim], axisymmetric=axis))
     for where, values in contact:
         np.add.at(force, np.searchsorted(nodes, where), values)
-    # middle nodes beside linear elements follow their ends, which carry their forces
-    for a, b, middle in places_in(nodes, middles_on_linear([(z.shape, z.cells) for z in zones])):
-        force[[a, b]] += force[middle] / 2
-        force[middle] = 0.0
+    _to_masters(points, [(z.shape, places_in(nodes, z.cells)) for z in zones], force)
     known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
     force -= np.einsum("nij,nj->ni", held_at(known, held, nodes), force)
     size = np.linalg.norm(force, axis=1)
     wrong = np.flatnonzero(size > UNBALANCED * scale)
     worst = wrong[np.argsort(-size[wrong], kind="stable")]
     return nodes[worst], force[worst]
+
+
+def _to_masters(points: FloatArray, blocks: Sequence[Block], force: FloatArray) -> None:
+    """Move the forces of hanging nodes, and of middle nodes beside linear elements, to those that they follow."""
+    hanging, masters = hanging_nodes(points, blocks)
+    count = (masters >= 0).sum(axis=1)
+    row, place = np.nonzero(masters >= 0)
+    # a node may follow one that hangs itself
+    while force[hanging].any():
+        share = force[hanging] / count[:, None]
+        force[hanging] = 0.0
+        np.add.at(force, masters[row, place], share[row])
 
 
 def known_tractions(

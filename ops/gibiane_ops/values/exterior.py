@@ -10,7 +10,7 @@ import numpy as np
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context
 from gibiane.values import CHPOINT, FLOTTANT, MAILLAGE, POINT, RIGIDITE
-from gibiane_ops.kernels import geometry, integrals, topology
+from gibiane_ops.kernels import geometry, hanging, integrals, topology
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.topology import Facets
@@ -94,7 +94,7 @@ def exterior(
     points = store.coords[:, :dim]
     sides = []
     with worded(ctx, at="model"):
-        boundary = topology.boundary([(z.shape, z.cells) for z in zones])
+        boundary = hanging.outer_boundary(points, [(z.shape, z.cells) for z in zones])
     known, held = held_directions(store, supports, DISPLACEMENTS[zones[0].family], dim)
     for name, facets in boundary.items():
         normal = nodal_normals(shape(name), points[facets.nodes])

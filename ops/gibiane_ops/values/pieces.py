@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gibiane.registry import Context
+from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.cutting import CENTRES, CORNERS, MIDDLES, Cutting
 from gibiane_ops.kernels.estimate.sides import Parts
+from gibiane_ops.kernels.hanging import outer_boundary
 from gibiane_ops.kernels.topology import Facets
 from gibiane_ops.values.exterior import Side
 from gibiane_ops.values.modele import ModelZone
@@ -84,7 +86,16 @@ def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = Non
     rank = np.empty(len(nodes), np.int64)
     rank[np.lexsort((nodes, lead))] = np.arange(len(nodes))
     points = node_store(ctx).coords[nodes][:, :dim]
-    cutting = Cutting(points, [(z.shape, c) for z, c in zip(zones, cells, strict=True)], rank, finest)
+    blocks = [(z.shape, c) for z, c in zip(zones, cells, strict=True)]
+    outer, every = outer_boundary(points, blocks), topology.boundary(blocks)
+    if sum(len(f.nodes) for f in outer.values()) < sum(len(f.nodes) for f in every.values()):
+        ctx.fail(
+            251,
+            "an equilibrated stress is not built on small elements beside a large one (hanging nodes)",
+            at="model",
+            hint="'RESI' takes them; TRI3 and TET4 divided in place have none",
+        )
+    cutting = Cutting(points, blocks, rank, finest)
     return Pieces(zones, nodes, cells, cutting)
 
 

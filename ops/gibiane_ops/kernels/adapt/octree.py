@@ -10,8 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels import geometry
-from gibiane_ops.kernels.adapt import hanging
+from gibiane_ops.kernels import geometry, hanging
 from gibiane_ops.kernels.adapt.sizes import element_sizes
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape

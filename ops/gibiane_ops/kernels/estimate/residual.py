@@ -11,6 +11,7 @@ from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import FloatArray, IntArray, stress_tensor
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.hanging import pieces_of_facets
 from gibiane_ops.kernels.recovery import StressBlock, extrapolate
 from gibiane_ops.kernels.topology import Facets, faces_of, families, group_by_nodes
 
@@ -69,7 +70,7 @@ def residuals(
     body : (dim,) float64, force / length^3
         Body force.
     traction : dict of str to (k, n, dim) float64, force / length^2
-        Imposed tractions at the nodes of the facets of `topology.boundary` of these blocks, in its order.
+        Imposed tractions at the nodes of the facets of `hanging.outer_boundary` of these blocks, in its order.
     free : dict of str to (k, dim, dim) float64
         Projectors on the directions in which displacements are prescribed there: no residual in them.
     interior, facets : float
@@ -85,10 +86,10 @@ def residuals(
     -----
     ``eta_K^2 = C (h_K / p)^2 / E int |div sigma_h + f|^2 + 1/2 sum_F C h_F / p / E int |[sigma_h n]|^2`` with h the
     largest distance between corners and p the degree, on a facet the higher of its two cells; boundary facets count
-    whole. Between its points sigma_h is what `recovery.extrapolate` builds: the stress itself on cells with straight
-    edges (QUA8, CU20: parallelepipeds). Round an axis the divergence holds ``(s_rr - s_tt) / r`` and ``s_rz / r``.
-    The true error is below a multiple of eta that depends on the shapes of the elements and is not known: an
-    estimate, not a bound.
+    whole. Small cells beside a large one (hanging nodes) share its facet. Between its points sigma_h is what
+    `recovery.extrapolate` builds: the stress itself on cells with straight edges (QUA8, CU20: parallelepipeds). Round
+    an axis the divergence holds ``(s_rr - s_tt) / r`` and ``s_rz / r``. The true error is below a multiple of eta that
+    depends on the shapes of the elements and is not known: an estimate, not a bound.
 
     Source
     ------
@@ -122,12 +123,20 @@ def residuals(
         second = np.setdiff1d(np.arange(len(group)), first, assume_unique=True)
         one, two = first[group[second]], second
         gap = T[one] - _aligned(of, T[two], corners[two], corners[one])
+        edge = np.flatnonzero(count[group] == 1)
+        piece, whole, weights = _pieces(points, family, [every[name].nodes for name in family], edge)
+        if len(piece):
+            # the stress of the large cell at the nodes of the facets of the small ones
+            c = of.n_corners
+            large = np.einsum("kab,kbij->kaij", weights, T[whole, :c])
+            gap = np.concatenate([gap, T[piece] - _completed(of, large)])
+            one, two = np.concatenate([one, piece]), np.concatenate([two, whole])
+            edge = np.setdiff1d(edge, np.concatenate([piece, whole]))
         pair = cell[one], cell[two]
         C = facets * _size(of, X[one]) / np.maximum(degree[pair[0]], degree[pair[1]])
         jump = C * _square(of, X[one], gap, None, axisymmetric) * 2 / (young[pair[0]] + young[pair[1]])
         for each in pair:
             across += np.bincount(each, jump / 2, minlength=len(across))
-        edge = np.flatnonzero(count[group] == 1)
         if len(edge):
             here = [name for name in family if name in traction]
             imposed = np.concatenate([_completed(of, traction[name]) for name in here])
@@ -136,6 +145,21 @@ def residuals(
             value = C * _square(of, X[edge], T[edge], (imposed, kept), axisymmetric) / young[cell[edge]]
             outside += np.bincount(cell[edge], value, minlength=len(outside))
     return Residuals(inside, np.split(across, cuts), np.split(outside, cuts))
+
+
+def _pieces(
+    points: FloatArray, family: Sequence[str], nodes: Sequence[IntArray], alone: IntArray
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return the facets that are pieces of others among those of one cell only, see `hanging.pieces_of_facets`."""
+    start = 0
+    for name, each in zip(family, nodes, strict=True):
+        if name in ("SEG2", "QUA4"):
+            rows = alone[(alone >= start) & (alone < start + len(each))]
+            piece, whole, weights = pieces_of_facets(points, each[rows - start])
+            return rows[piece], rows[whole], weights
+        start += len(each)
+    none = np.zeros(0, np.int64)
+    return none, none, np.zeros((0, 1, 1))
 
 
 def _size(of: Shape, X: FloatArray) -> FloatArray:
