@@ -28,10 +28,12 @@ from gibiane_ops.kernels.estimate.admissible import Admissible, admissible_stres
 from gibiane_ops.kernels.estimate.bodies import loose_motions
 from gibiane_ops.kernels.estimate.contact_bound import contact_tractions
 from gibiane_ops.kernels.estimate.equilibrium import equilibrium_residual
+from gibiane_ops.kernels.estimate.improve import improve
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.kernels.estimate.pieces import balanced_stress, uniform_aim
 from gibiane_ops.kernels.estimate.simplices import simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
+from gibiane_ops.kernels.estimate.zoom import zoomed
 from gibiane_ops.kernels.materials import isotropic
 from gibiane_ops.kernels.solve import factorize
 from gibiane_ops.kernels.topology import boundary
@@ -278,6 +280,13 @@ def assert_bounded(script, threshold, states, most):
     assert 1 <= found["EC"] / np.sqrt(found["EN"] + (found["EF"] / most) ** 2) <= most
 
 
+def touching(target):
+    """Cells with a side in contact."""
+    found = np.zeros(len(target.cell), bool)
+    found[target.mesh.cell[target.facet >= 0]] = True
+    return found
+
+
 def test_slips_of_several_directions():
     # Nodes that slip all carry the bound times their area; their directions differ, so that no traction within the
     # bound has these nodal forces. Tractions that balance the bodies are within the law, and go on to be.
@@ -302,6 +311,29 @@ def test_slips_of_several_directions():
         of.estimate(u, of.with_contact(replace(found, traction=1.01 * found.traction)), nodal=False)
     assert bound.target.limits.excess(bound.tau) <= 1e-9
     assert bound.target.limits.excess(1.03 * bound.tau) > 1e-6
+    # Smaller cells on both sides of the contact: the same tractions, the same work, the same law.
+    bound = of.estimate(u, of.with_contact(found), 1, joint, nodal=False)
+    fine, tau, k = bound.target, bound.tau, len(joint.closed)
+    for _ in range(3):
+        fine, tau, _ = zoomed(fine, tau, touching(fine))
+    assert (fine.facet >= 0).sum() >= 4 * (bound.target.facet >= 0).sum()
+    assert fine.work(tau, k) == pytest.approx(bound.target.work(bound.tau, k), rel=1e-12)
+    assert np.abs(fine.work(tau, k)).max() > 0
+    assert fine.residual(tau) < 1e-10
+    assert fine.limits.excess(tau) <= 1e-9
+    assert fine.limits.excess(1.03 * tau) > 1e-6
+    before = fine.distance(tau).sum() + 2 * fine.work(tau, k).sum()
+    improve(fine, tau, np.arange(len(fine.cell)))
+    assert fine.distance(tau).sum() + 2 * fine.work(tau, k).sum() < before
+    assert fine.residual(tau) < 1e-10
+    assert fine.limits.excess(tau) <= 1e-9
+    # With friction of another law pressures alone may change: what slides stays as it was given.
+    held = of.estimate(u, of.with_contact(found), 1, replace(joint, bound=None, slip=None), nodal=False)
+    fine, tau = held.target, held.tau
+    for _ in range(3):
+        fine, tau, _ = zoomed(fine, tau, touching(fine))
+    assert np.abs(fine.given[fine.facet >= 0]).max() > 0
+    assert fine.residual(tau) < 1e-10
     one_side = of.traction.copy()
     row = {tuple(nodes): i for i, nodes in enumerate(of.nodes)}
     for nodes, values in zip(of.slave, found.traction, strict=True):
