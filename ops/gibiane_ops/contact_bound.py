@@ -34,7 +34,7 @@ from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import solid_zones
 from gibiane_ops.values.modele import Modele
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
-from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, doubts_of, pieces_of
+from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, doubts_of, fields_of, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
@@ -104,8 +104,9 @@ def _bound_with_contact(
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)])
     pieces = pieces_of(ctx, zones, pairs, CORNERS)
     check_balance(ctx, pieces, stress, outside, volu, cl, [each for s in states for each in _forces(s)])
-    boundary, same = cut_sides(ctx, pieces, outside)
-    sides = [boundary]
+    fields = fields_of(ctx, pieces, stress, material)
+    boundary = cut_sides(ctx, pieces, outside, fields)
+    sides = [boundary.side]
     blocks = [(z.shape, z.cells) for z in zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
@@ -118,7 +119,7 @@ def _bound_with_contact(
         squares.append(each)
         doubts += _doubts(ctx, state, given.law, found)
     joint, parts = _joint(ctx, states, given.law, pieces, sides[0], squares)
-    solid = equilibrated(ctx, pieces, stress, material, sides[0], volu, sweeps, cl, joint, nodal)
+    solid = equilibrated(ctx, pieces, stress, material, fields, boundary, volu, sweeps, cl, joint, nodal)
     for (square, owner), change in zip(parts, np.split(solid.contact, _ends(parts)), strict=bool(len(solid.contact))):
         np.add.at(square, owner, change)
     for state, each in zip(states, squares, strict=True):
@@ -128,7 +129,7 @@ def _bound_with_contact(
         facets += facet_zones(ctx, state, each, zones[0].mode)
     if solid.excess > VIOLATION:
         doubts.append(_unlawful(solid.excess))
-    cutting = doubts_of(ctx, pieces, same)
+    cutting = doubts_of(ctx, pieces, boundary.same, fields)
     doubts += [cutting] if cutting else []
     guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
     more: dict[str, Any] = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}

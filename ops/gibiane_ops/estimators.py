@@ -28,7 +28,7 @@ from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_compliance, on_zone, solid_zones
 from gibiane_ops.values.modele import FORCES, Modele, ModelZone
 from gibiane_ops.values.nodes import node_store
-from gibiane_ops.values.pieces import cut_sides, doubts_of, pieces_of
+from gibiane_ops.values.pieces import cut_sides, doubts_of, fields_of, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
@@ -74,9 +74,10 @@ def _constitutive_relation(
     sides = exterior(ctx, zones, cl, pres, fsur)
     pieces = pieces_of(ctx, zones)
     check_balance(ctx, pieces, stress, sides, volu, cl)
-    boundary, same = cut_sides(ctx, pieces, sides)
-    found = equilibrated(ctx, pieces, stress, material, boundary, volu, sweeps, cl)
-    guarantee = guarantee_of(ctx, found, doubts_of(ctx, pieces, same))
+    fields = fields_of(ctx, pieces, stress, material)
+    boundary = cut_sides(ctx, pieces, sides, fields)
+    found = equilibrated(ctx, pieces, stress, material, fields, boundary, volu, sweeps, cl)
+    guarantee = guarantee_of(ctx, found, doubts_of(ctx, pieces, boundary.same, fields))
     more: dict[str, Any] = {"EQUILIBRE": found.residual, "HISTOIRE": ListReel(found.history)}
     more |= energy_bounds(found)
     return results(ctx, parts_of(pieces, found), kind, norm, tabl, guarantee, refe, more)

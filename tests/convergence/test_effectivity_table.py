@@ -83,10 +83,8 @@ def test_equilibrated_stresses_bound_every_error(element):
             continue
         assert list(row["theta"]) == list(NAMES)
         assert row["guaranteed"], (name, n)
-        # The cells of the equilibrated stress are made smaller where it is singular, not those of bilinear elements.
-        most = 1.05 if of == "TRI3" else 1.15 if name in SINGULAR else 1.1
-        assert 1 <= row["theta"]["RDC"] <= most, (name, n)
-    assert table()["hole", element, 6]["theta"]["RDC"] > table()["hole", element, 24]["theta"]["RDC"] >= 1
+        # The cells of the equilibrated stress are made smaller where it is singular.
+        assert 1 <= row["theta"]["RDC"] <= 1.05, (name, n)
 
 
 @pytest.mark.parametrize("element", QUADRATIC)
@@ -98,7 +96,10 @@ def test_quadratic_elements_want_patches(element):
         wanted, near = (SINGULAR[name], 0.05) if name in SINGULAR else (2.0, 0.25 if name == "hole" else 0.03)
         assert rate == pytest.approx(wanted, abs=near), name
         theta = fine["theta"]
-        assert list(theta) == [each for each in NAMES if each != "RDC"]
+        assert list(theta) == list(NAMES)
+        # straight sides: a bound; on the chords of curved ones the stress is no worse
+        assert fine["guaranteed"] == (name in SINGULAR)
+        assert (1 if fine["guaranteed"] else 0.97) <= theta["RDC"] <= 1.2, name
         # residuals follow the error at its rate, whatever it is; that of the hole is not reached yet
         assert theta["RESI"] == pytest.approx(coarse["theta"]["RESI"], rel=0.06 if name == "hole" else 0.03)
         if name in SINGULAR:
@@ -126,7 +127,9 @@ def test_estimates_in_space():
         if element in ("CU20", "TE10"):
             # coarse: 4 elements along the thickness of the tube, 1.6 and 1.8 there
             assert 1 <= theta["SPR"] <= 2
-            assert list(theta) == [each for each in NAMES if each != "RDC"]
+            assert list(theta) == list(NAMES)
+            assert row["guaranteed"] == (name != "tube")
+            assert (1 if row["guaranteed"] else 0.95) <= theta["RDC"] <= 1.35
             assert 0.95 <= theta["SPRE"] <= 2
             assert 0.5 < theta["RESI"] < 2
             assert max(theta["MOYE"], theta["PROJ"]) < (0.75 if name == "tube" else 0.9)
@@ -137,6 +140,5 @@ def test_estimates_in_space():
             low, high = (0.85, 1.1) if smooth else (0.75, 1.1)
             assert low <= theta[method] <= high, (name, element, method)
         assert row["guaranteed"]
-        # The cells of the equilibrated stress are made smaller at a singular edge, those of bricks and prisms are not.
-        most = 1.1 if smooth or element == "TET4" else 1.3
+        most = 1.1 if smooth or element == "TET4" else 1.15
         assert 1 <= theta["RDC"] <= most, (name, element)

@@ -6,19 +6,19 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibiane.registry import Context
-from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
-from gibiane_ops.kernels.estimate.fields import Field, field_of
+from gibiane_ops.kernels.estimate.bodies import without_resultants
+from gibiane_ops.kernels.estimate.fields import Field
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.kernels.estimate.macro import STATIC
 from gibiane_ops.kernels.estimate.pieces import Source, balanced_stress, uniform_aim
 from gibiane_ops.kernels.estimate.simplices import Simplices, simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
 from gibiane_ops.kernels.estimate.zz import SolidError
-from gibiane_ops.kernels.supports import moved
 from gibiane_ops.kernels.topology import group_by_nodes
 from gibiane_ops.values.balance import unbalanced
 from gibiane_ops.values.champs import MChaml
@@ -27,9 +27,9 @@ from gibiane_ops.values.exterior import Side, held_at, held_directions, projecto
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import elastic_law, on_zone
-from gibiane_ops.values.modele import DISPLACEMENTS, ModelZone
+from gibiane_ops.values.modele import DISPLACEMENTS
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
-from gibiane_ops.values.pieces import ROUND_OFF, Pieces
+from gibiane_ops.values.pieces import ROUND_OFF, Boundary, Pieces
 from gibiane_ops.values.rigidite import Rigidite
 
 WORKLESS = 1e-7
@@ -88,7 +88,8 @@ def equilibrated(
     pieces: Pieces,
     stress: MChaml,
     material: MChaml,
-    side: Side,
+    fields: list[Field],
+    boundary: Boundary,
     volu: Point | None,
     sweeps: int | None,
     supports: Rigidite | None,
@@ -115,13 +116,14 @@ def equilibrated(
     aim, source = None, None
     with worded(ctx, at="model"):
         mesh = simplices(points, cells)
-        traction, free = _on_boundary(side, mesh.nodes[mesh.boundary])
+        traction, free, bent = _on_boundary(boundary, mesh.nodes[mesh.boundary])
         loads = Exterior(traction, free, np.tile(body, (len(cells), 1)))
+        if bent.any():
+            loads = without_resultants(mesh, loads, bent)
         if pieces.whole:
             sigma = np.concatenate([v.mean(axis=1) for v in values])
             aim = None if nodal else uniform_aim(sigma[:, STATIC[dim]], dim)
         else:
-            fields = [_field(ctx, *each, stress.support) for each in zip(zones, values, laws, strict=True)]
             source = _source(pieces, fields)
             aim = source.aim(mesh.points[mesh.cells], plane_compliance(law, dim))
             sigma = np.zeros((len(cells), law.shape[1]))
@@ -197,14 +199,6 @@ def check_balance(
         _unbalanced(ctx, nodes, forces)
 
 
-def _field(ctx: Context, zone: ModelZone, values: FloatArray, law: FloatArray, support: str) -> Field:
-    """Return the strains of the elements of a zone."""
-    of, dim = shape(zone.shape), zone.dim
-    at_points = moved(of, values, support, "STRESSES")[..., STATIC[dim]]
-    strain = np.matmul(at_points, plane_compliance(law, dim).swapaxes(1, 2))
-    return field_of(of, node_store(ctx).coords[zone.cells][:, :, :dim], strain)
-
-
 def _source(pieces: Pieces, fields: list[Field]) -> Source:
     """Return where the stress on the pieces comes from, their corners in the order of the mesh of simplices."""
     owner = pieces.cutting.owner
@@ -225,15 +219,16 @@ def _held(pieces: Pieces, mesh: Simplices, free: FloatArray, at_nodes: FloatArra
     return around
 
 
-def _on_boundary(side: Side, boundary: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Put what is imposed on the sides in the order of the boundary of a mesh of simplices."""
+def _on_boundary(boundary: Boundary, edge: IntArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
+    """Put what is known of the sides in the order of the boundary of a mesh of simplices."""
+    side = boundary.side
     given = side.facets.nodes
     order = np.argsort(given, axis=1)
-    group, _ = group_by_nodes(np.vstack([boundary, given]))
-    place = np.empty(len(boundary), np.int64)
-    place[group[: len(boundary)]] = np.arange(len(boundary))
-    traction, free = np.empty_like(side.traction), np.empty_like(side.free)
-    rows = place[group[len(boundary) :]]
+    group, _ = group_by_nodes(np.vstack([edge, given]))
+    place = np.empty(len(edge), np.int64)
+    place[group[: len(edge)]] = np.arange(len(edge))
+    traction, free, bent = np.empty_like(side.traction), np.empty_like(side.free), np.zeros(len(edge), bool)
+    rows = place[group[len(edge) :]]
     traction[rows] = np.take_along_axis(side.traction, order[:, :, None], axis=1)
-    free[rows] = side.free
-    return traction, free
+    free[rows], bent[rows] = side.free, boundary.bent
+    return traction, free, bent

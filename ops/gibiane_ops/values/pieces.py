@@ -3,21 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gibiane.registry import Context
 from gibiane_ops.kernels import topology
+from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
+from gibiane_ops.kernels.estimate.admissible import plane_compliance
 from gibiane_ops.kernels.estimate.cutting import CENTRES, CORNERS, MIDDLES, Cutting
+from gibiane_ops.kernels.estimate.fields import Field, field_of
+from gibiane_ops.kernels.estimate.macro import STATIC
 from gibiane_ops.kernels.estimate.sides import Parts
 from gibiane_ops.kernels.hanging import outer_boundary
+from gibiane_ops.kernels.supports import moved
 from gibiane_ops.kernels.topology import Facets
-from gibiane_ops.values.exterior import Side
+from gibiane_ops.values.champs import MChaml
+from gibiane_ops.values.exterior import Side, nodal_normals
+from gibiane_ops.values.material import elastic_law, on_zone
 from gibiane_ops.values.modele import ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
 ROUND_OFF = 1e-9
+MISFIT = 1e-6
+"""Largest strain that no displacement of an element has, over the largest strain, that is round-off."""
+
 SIMPLICES = ("TRI3", "TET4")
 
 
@@ -99,6 +111,20 @@ def pieces_of(ctx: Context, zones: list[ModelZone], pairs: IntArray | None = Non
     return Pieces(zones, nodes, cells, cutting)
 
 
+def _stress_on(
+    fields: list[Field], start: IntArray, of: Shape, cell: IntArray, local: IntArray, rows: IntArray, xi: FloatArray
+) -> FloatArray:
+    """Return the stress at points of some facets of elements, counted through the zones from `start` on."""
+    parts = []
+    for field, first, last in zip(fields, start[:-1], start[1:], strict=True):
+        mine = (cell[rows] >= first) & (cell[rows] < last)
+        parts.append((mine, field.stresses_on(of, cell[rows[mine]] - first, local[rows[mine]], xi[mine])))
+    found = np.empty((*xi.shape[:2], len(STATIC[fields[0].of.dim])))
+    for mine, values in parts:
+        found[mine] = values
+    return found
+
+
 def _finest(zones: list[ModelZone]) -> int:
     """Choose the points of the simplices: the stress on them is linear in parts, that of quadratic elements linear.
 
@@ -112,33 +138,75 @@ def _finest(zones: list[ModelZone]) -> int:
     return MIDDLES if "TE10" in quadratic else CENTRES if quadratic else CORNERS
 
 
-def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side]) -> tuple[Side, bool]:
-    """Return the boundary as one set of sides of the simplices, and whether their linear tractions are those given.
+def fields_of(ctx: Context, pieces: Pieces, stress: MChaml, material: MChaml) -> list[Field]:
+    """Return the stress inside the elements of each zone; nothing when it is uniform there."""
+    found: list[Field] = []
+    for zone in [] if pieces.whole else pieces.zones:
+        of, dim = shape(zone.shape), zone.dim
+        values = moved(of, on_zone(ctx, stress, zone, "sig").values, stress.support, "STRESSES")[..., STATIC[dim]]
+        law = elastic_law(ctx, material, zone, "mat")
+        compliance = np.broadcast_to(plane_compliance(law, dim), (len(values), *[values.shape[2]] * 2))
+        found.append(field_of(of, node_store(ctx).coords[zone.cells][:, :, :dim], values, compliance))
+    return found
 
-    Nodes of the result are points of the simplices. Tractions have on each side the moments of those given, which
-    keeps their resultants: they are the same where these are linear.
+
+@dataclass(frozen=True, eq=False)
+class Boundary:
+    """Sides of the simplices on the boundary of a model.
+
+    Attributes
+    ----------
+    side : Side
+        Nodes are points of the simplices.
+    same : bool
+        Whether their linear tractions are those given.
+    bent : (k,) bool
+        Those that stand for parts of curved facets.
     """
+
+    side: Side
+    same: bool
+    bent: NDArray[np.bool_]
+
+
+def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side], fields: list[Field]) -> Boundary:
+    """Cut the boundary into sides of the simplices.
+
+    Tractions have on each side the moments of those given, which keeps their resultants: they are the same where these
+    are linear. On chords of curved facets see `Parts.linear`.
+    """
+    start = np.cumsum([0] + [len(z.cells) for z in pieces.zones])
     dim = pieces.zones[0].dim
     name, points = "SEG2" if dim == 2 else "TRI3", node_store(ctx).coords[:, :dim]
     parts, same = [], True
     for side in sides:
         of = shape(side.facets.name)
         sides_of, at, owner = pieces.facets(of.name, side.facets.nodes)
-        traction = side.traction[owner]
+        traction, bent = side.traction[owner], np.zeros(len(owner), bool)
         if of.name == name and pieces.cutting.finest < MIDDLES:
             # as given, to the last digit
             given = np.einsum("kan,kni->kai", of.N(at.reshape(-1, dim - 1)).reshape(*at.shape[:2], -1), traction)
         else:
             X, corners = points[side.facets.nodes[owner]], pieces.cutting.points[sides_of]
-            given, left = Parts(of, X, at, corners).linear(traction)
+            cell, local = side.facets.cell[owner], side.facets.local[owner]
+            stress = partial(_stress_on, fields, start, of, cell, local)
+            parts_of = Parts(of, X, at, corners)
+            bare, pressure = None, None
+            if side.pressure is not None:
+                normal = nodal_normals(of, points[side.facets.nodes])
+                bare, pressure = (side.traction + side.pressure[..., None] * normal)[owner], side.pressure[owner]
+            given, left = parts_of.linear(traction, stress, bare, pressure)
+            bent[parts_of.bent()] = True
             same = same and left.max(initial=0.0) <= ROUND_OFF * float(np.abs(side.traction).max(initial=0.0))
-        parts.append((sides_of, side.facets.cell[owner], given, side.free[owner]))
-    nodes, cell, values, free = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return Side(Facets(name, nodes, cell, np.zeros(len(nodes), np.int64)), values, free), same
+        parts.append((sides_of, side.facets.cell[owner], given, side.free[owner], bent))
+    nodes, cell, values, free, chords = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return Boundary(Side(Facets(name, nodes, cell, np.zeros(len(nodes), np.int64)), values, free), same, chords)
 
 
-def doubts_of(ctx: Context, pieces: Pieces, same: bool) -> str:
+def doubts_of(ctx: Context, pieces: Pieces, same: bool, fields: list[Field]) -> str:
     """Say why the simplices are not exactly the elements and their loads; nothing when they are."""
+    if any(field.misfit > MISFIT for field in fields):
+        return "the stress is not that of a displacement in the elements: thermal or other strains are part of it"
     points = node_store(ctx).coords[pieces.nodes][:, : pieces.zones[0].dim]
     for zone, cells in zip(pieces.zones, pieces.cells, strict=True):
         of, X = shape(zone.shape), points[cells]

@@ -1,4 +1,4 @@
-"""Rigid motions that supports leave to the bodies of a mesh: what loads on them must balance."""
+"""Rigid motions that supports leave to the bodies of a mesh: loads must do no work in them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.estimate.macro import moments
+from gibiane_ops.kernels.estimate.simplices import Simplices
+from gibiane_ops.kernels.estimate.tractions import Exterior
+
+BoolArray = NDArray[np.bool_]
 
 NONE = 1e-8
 """Displacement of held nodes that is none, over the largest of the motion."""
@@ -69,3 +75,34 @@ def _rigid(X: FloatArray) -> FloatArray:
             turn[:, i], turn[:, j] = -arm[:, j], arm[:, i]
             found.append(turn)
     return np.stack(found)
+
+
+def without_resultants(mesh: Simplices, exterior: Exterior, sides: BoolArray) -> Exterior:
+    """Change tractions so that loads do no work in the rigid motions that sides held by supports leave to each body.
+
+    Parameters
+    ----------
+    mesh : Simplices
+    exterior : Exterior
+        With resultants that are small: those of chords that stand for curved sides.
+    sides : (k,) bool
+        Sides of the boundary whose tractions change, as rigid motions do: by the least in the mean.
+
+    Returns
+    -------
+    Exterior
+    """
+    dim, edge = mesh.dim, mesh.boundary
+    around = np.zeros((len(mesh.points), dim, dim))
+    np.add.at(around, mesh.nodes[edge], np.repeat(exterior.free[:, None], dim, axis=1))
+    values, vectors = np.linalg.eigh(around)
+    held = np.einsum("nik,nk,njk->nij", vectors, np.where(values > NONE, 1.0, 0.0), vectors)
+    motions = loose_motions(mesh.points, [mesh.cells], held)
+    area = np.linalg.norm(mesh.outward[mesh.cell[edge, 0], mesh.local[edge, 0]], axis=1)
+    there = np.einsum("k,ab,qkbi->qkai", area, moments(dim), motions[:, mesh.nodes[edge]], optimize=True)
+    work = np.einsum("qkai,kai->q", there, exterior.traction)
+    work += np.einsum("m,mi,qmi->q", mesh.volume, exterior.body, motions[:, mesh.cells].mean(axis=2), optimize=True)
+    shapes = motions[:, mesh.nodes[edge]] * sides[:, None, None]
+    gram = np.einsum("pkai,qkai->pq", there, shapes)
+    change = np.einsum("q,qkai->kai", np.linalg.pinv(gram) @ work, shapes)
+    return Exterior(exterior.traction - change, exterior.free, exterior.body)

@@ -27,7 +27,7 @@ RATIONAL = ("PYR5", "PY13")
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Strains of the displacement of elements, each up to its rigid motion.
+    """Strains and stresses of the displacement of elements, each up to its rigid motion.
 
     Attributes
     ----------
@@ -38,6 +38,8 @@ class Field:
         Elements whose map is affine: strains are polynomials there.
     straight : (m,) bool
         Elements whose middle nodes are in the middles of their edges: their map is that of the linear shape.
+    law : (m, n_s, n_s) float64, force / length^2
+        Stress from strain, components of `macro.STATIC`.
     misfit : float
         Largest difference to the strains given, over the largest of them: round-off for those of a displacement.
     """
@@ -47,6 +49,7 @@ class Field:
     U: FloatArray
     affine: NDArray[np.bool_]
     straight: NDArray[np.bool_]
+    law: FloatArray
     misfit: float
 
     def strains(self, cells: IntArray, x: FloatArray, guess: FloatArray) -> FloatArray:
@@ -87,6 +90,28 @@ class Field:
         pairs = PAIRS[dim]
         return np.stack([gradient[..., i, j] + (gradient[..., j, i] if i != j else 0.0) for i, j in pairs], axis=-1)
 
+    def stresses_on(self, of: Shape, cells: IntArray, local: IntArray, xi: FloatArray) -> FloatArray:
+        """Evaluate stresses at points of facets.
+
+        Parameters
+        ----------
+        of : Shape
+            Of the facets.
+        cells, local : (k,) int64
+            Element of each facet, and which of its facets it is.
+        xi : (k, p, dim - 1) float64
+            Points in reference coordinates of the facets.
+
+        Returns
+        -------
+        (k, p, n_s) float64
+        """
+        N = of.N(xi.reshape(-1, of.dim)).reshape(*xi.shape[:2], -1)
+        nodes = np.array([self.of.faces[i][1] for i in local])
+        x = np.matmul(N, self.X[cells[:, None], nodes])
+        strain = self.strains(cells, x, np.matmul(N, self.of.ref_nodes[nodes]))
+        return np.asarray(np.matmul(strain, self.law[cells]), np.float64)
+
 
 def located(of: Shape, X: FloatArray, x: FloatArray, guess: FloatArray) -> FloatArray:
     """Find the reference coordinates of points of elements or facets by Newton's method.
@@ -108,10 +133,10 @@ def located(of: Shape, X: FloatArray, x: FloatArray, guess: FloatArray) -> Float
     NotConverged
         A point has no reference coordinates.
     """
-    k, p, _ = x.shape
-    X, xi = np.repeat(X, p, axis=0), guess.reshape(k * p, -1).copy()
-    x = x.reshape(k * p, -1)
-    size = np.abs(X - X[:, :1]).max(axis=(1, 2))
+    k, p, dim = x.shape
+    X, xi = np.repeat(X, p, axis=0), guess.reshape(k * p, of.dim).copy()
+    x = x.reshape(k * p, dim)
+    size = np.abs(X - X[:, :1]).max(axis=(1, 2), initial=0.0)
     history: list[float] = []
     rows = np.arange(len(x))
     for _ in range(INVERSIONS):
@@ -120,23 +145,24 @@ def located(of: Shape, X: FloatArray, x: FloatArray, guess: FloatArray) -> Float
         history.append(float((np.abs(left).max(axis=1) / size[rows]).max(initial=0.0)))
         rows, left = rows[far], left[far]
         if not len(rows):
-            return xi.reshape(k, p, -1)
+            return xi.reshape(k, p, of.dim)
         J = np.einsum("kni,knj->kij", X[rows], of.dN(xi[rows]))
         Jt = J.swapaxes(1, 2)
         xi[rows] += np.linalg.solve(np.matmul(Jt, J), np.matmul(Jt, left[..., None]))[..., 0]
     raise NotConverged(history, xi)
 
 
-def field_of(of: Shape, X: FloatArray, strain: FloatArray) -> Field:
-    """Find displacements of elements that have given strains.
+def field_of(of: Shape, X: FloatArray, stress: FloatArray, compliance: FloatArray) -> Field:
+    """Find displacements of elements that have given stresses.
 
     Parameters
     ----------
     of : Shape
         In a plane or in space.
     X : (m, n_nodes, d) float64, length
-    strain : (m, q, n_s) float64
+    stress : (m, q, n_s) float64, force / length^2
         At the points of the stiffness rule, components of `macro.STATIC`.
+    compliance : (m, n_s, n_s) float64, length^2 / force
 
     Returns
     -------
@@ -153,6 +179,7 @@ def field_of(of: Shape, X: FloatArray, strain: FloatArray) -> Field:
     One symmetric system of all the displacements of each element.
     """
     points, (m, n, dim) = of.gauss[0], X.shape
+    strain = np.matmul(stress, compliance)
     J = geometry.jacobians(of, X, points)
     affine = np.abs(J - J[:, :1]).max(axis=(1, 2, 3)) <= AFFINE * np.abs(J).max(axis=(1, 2, 3))
     if of.name in RATIONAL:
@@ -182,4 +209,12 @@ def field_of(of: Shape, X: FloatArray, strain: FloatArray) -> Field:
         u = u + np.linalg.solve(A, np.matmul(B.swapaxes(1, 2), given - np.matmul(B, u)))
         misfit = max(misfit, float(np.abs(given - np.matmul(B, u)).max(initial=0.0)))
         U[some] = u[..., 0].reshape(-1, n, dim)
-    return Field(of, X, U, affine, straight, misfit / largest if largest else 0.0)
+    return Field(
+        of,
+        X,
+        U,
+        affine,
+        straight,
+        np.asarray(np.linalg.inv(compliance), np.float64),
+        misfit / largest if largest else 0.0,
+    )

@@ -175,12 +175,11 @@ def _integrated(
     parts = np.repeat(np.eye(n)[None], n, axis=0)
     parts[range(n), range(n)] = 1.0 / n
     bary = np.einsum("qp,kpc->kqc", inside, parts).reshape(-1, n)
-    law = np.linalg.inv(compliance)
     step = max(CHUNK // len(bary), 1)
     for start in range(0, len(owner), step):
         some = slice(start, start + step)
         strain = field.strains(owner[some], bary @ corners[some], bary @ at[some])
-        values = np.matmul(strain, law[some]).reshape(-1, n, len(rule.weights), n_s)
+        values = np.matmul(strain, field.law[owner[some]]).reshape(-1, n, len(rule.weights), n_s)
         mean = np.einsum("q,mkqs->ms", weight, values)
         values = values - mean[:, None, None]
         F = (corners[some, 1:] - corners[some, :1]).swapaxes(1, 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.estimate.fields import located
-from gibiane_ops.kernels.estimate.macro import moments
+from gibiane_ops.kernels.estimate.macro import contraction, moments
 
 STRAIGHT = 1e-9
 """Largest distance of a node to the line or plane of its facet, over the size of the facet, that is none."""
@@ -38,13 +39,28 @@ class Parts:
     at: FloatArray
     corners: FloatArray
 
-    def linear(self, traction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def linear(
+        self,
+        traction: FloatArray,
+        stress: Callable[[IntArray, FloatArray], FloatArray] | None = None,
+        bare: FloatArray | None = None,
+        pressure: FloatArray | None = None,
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the linear tractions of the same moments.
 
         Parameters
         ----------
         traction : (k, n_nodes, d) float64, force / length^(d - 1)
             At the nodes of the facets.
+        stress : callable, optional
+            ``stress(rows, xi)``, (m, q, n_s): that at points of facets, in their reference coordinates. With it, chords
+            of curved facets also carry what it does by their tilt, ``s (n_chord - n)``, whose resultant is about zero:
+            without, the tractions of a smooth stress would be wrong by the tilt, and the error of a fine mesh of
+            quadratic elements less than that.
+        bare : (k, n_nodes, d) float64, optional
+            Tractions without those of the pressure.
+        pressure : (k, n_nodes) float64, optional
+            It follows the bends of curved facets.
 
         Returns
         -------
@@ -60,13 +76,22 @@ class Parts:
         bent = self.bent()
         flat = np.setdiff1d(np.arange(len(area)), bent)
         xi[flat] = located(self.of, self.X[flat], inside @ self.corners[flat], xi[flat])
+        normal = np.zeros((0, 1, dim))
         if len(bent):
             normal, _ = self._normals(bent)
             density[bent] = np.linalg.norm(normal, axis=2) * rule.weights.sum()
         N = self.of.N(xi.reshape(-1, dim - 1)).reshape(*xi.shape[:2], -1)
         values = np.matmul(N, traction)
+        if len(bent) and bare is not None and pressure is not None:
+            normal = normal / np.linalg.norm(normal, axis=2, keepdims=True)
+            push = np.matmul(N[bent], pressure[bent, :, None])
+            values[bent] = np.matmul(N[bent], bare[bent]) - push * normal
         weight = rule.weights / rule.weights.sum()
         moment = np.einsum("q,kq,qa,kqi->kai", weight, density, inside, values, optimize=True)
+        if len(bent) and stress is not None:
+            normal, chord = self._normals(bent)
+            tilt = np.matmul(contraction(chord - normal, dim), stress(bent, xi[bent])[..., None])[..., 0]
+            moment[bent] += np.einsum("q,qa,kqi->kai", rule.weights, inside, tilt)
         given = np.einsum("ab,kbi->kai", np.linalg.inv(moments(dim)), moment) / area[:, None, None]
         return given, np.abs(inside @ given - values).max(axis=(1, 2), initial=0.0)
 
@@ -98,7 +123,7 @@ class Parts:
         return rule, shape("TRI3").N(rule.points)
 
     def _normals(self, rows: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return normals of facets at the points of the rule, and those of sides, (m, q, d), times the measures."""
+        """Return outward normals of facets at the points of the rule, and of sides, (m, q, d), times the measures."""
         dim = self.X.shape[2]
         _, inside = self._rule()
         xi = inside @ self.at[rows]
@@ -106,7 +131,8 @@ class Parts:
         part = shape("SEG2" if dim == 2 else "TRI3").dN(np.zeros((1, dim - 1)))[0]
         along = np.einsum("kni,kqnj,kaj,am->kqim", self.X[rows], slope, self.at[rows], part, optimize=True)
         chord = np.broadcast_to(np.einsum("kai,am->kim", self.corners[rows], part)[:, None], along.shape)
-        return _normal(along), _normal(chord)
+        turn = np.sign(np.linalg.det(np.einsum("kaj,am->kjm", self.at[rows], part)))[:, None, None]
+        return turn * _normal(along), turn * _normal(chord)
 
 
 def _normal(along: FloatArray) -> FloatArray:
