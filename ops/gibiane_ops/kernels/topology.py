@@ -1,4 +1,4 @@
-"""Facets, boundary, edges and neighbourhoods of a mesh given as blocks of cells.
+"""Facets, boundary and edges of a mesh given as blocks of cells.
 
 A mesh is a sequence of blocks ``(shape name, cells)`` with ``cells : (m, n_nodes) int64``. Cells are numbered through
 the blocks in their order: the cells of the second block follow those of the first.
@@ -6,11 +6,10 @@ the blocks in their order: the cells of the second block follow those of the fir
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from gibiane_ops.kernels.arrays import IntArray
 from gibiane_ops.kernels.elements.quadratic import LINEAR
@@ -188,8 +187,7 @@ def boundary(blocks: Sequence[Block]) -> dict[str, Facets]:
     """
     result = {}
     every = faces_of(blocks)
-    for family in families(every):
-        group, _ = group_by_nodes(np.vstack([every[name].nodes[:, : shape(name).n_corners] for name in family]))
+    for family, group, _ in facet_families(every):
         alone = np.bincount(group)[group] == 1
         for name in family:
             here, alone = np.split(alone, [len(every[name].nodes)])
@@ -198,12 +196,25 @@ def boundary(blocks: Sequence[Block]) -> dict[str, Facets]:
     return result
 
 
-def families(names: Iterable[str]) -> list[list[str]]:
-    """Group shapes of the same corners, linear and of second degree, in order of first appearance."""
+def facet_families(every: Mapping[str, Facets]) -> Iterator[tuple[list[str], IntArray, IntArray]]:
+    """Group facets of the same corners, whatever their degree.
+
+    Parameters
+    ----------
+    every : mapping of str to Facets
+
+    Yields
+    ------
+    family : list of str
+        Shapes of the same corners, linear and of second degree, in order of first appearance.
+    group, first : (k,) and (n_groups,) int64
+        See `group_by_nodes`, of the facets of the family one shape after the other.
+    """
     found: dict[str, list[str]] = {}
-    for name in names:
+    for name in every:
         found.setdefault(LINEAR.get(name, name), []).append(name)
-    return list(found.values())
+    for family in found.values():
+        yield family, *group_by_nodes(np.vstack([every[name].nodes[:, : shape(name).n_corners] for name in family]))
 
 
 def neighbours(blocks: Sequence[Block]) -> IntArray:
@@ -220,11 +231,12 @@ def neighbours(blocks: Sequence[Block]) -> IntArray:
         consecutive ones are paired.
     """
     pairs = [np.zeros((0, 2), np.int64)]
-    for name, facets in faces_of(blocks).items():
-        group, _ = group_by_nodes(facets.nodes[:, : shape(name).n_corners])
-        order = np.lexsort((facets.cell, group))
+    every = faces_of(blocks)
+    for family, group, _ in facet_families(every):
+        cell = np.concatenate([every[name].cell for name in family])
+        order = np.lexsort((cell, group))
         same = np.flatnonzero(group[order[1:]] == group[order[:-1]])
-        pairs.append(np.stack([facets.cell[order[same]], facets.cell[order[same + 1]]], axis=1))
+        pairs.append(np.stack([cell[order[same]], cell[order[same + 1]]], axis=1))
     return np.concatenate(pairs)
 
 
@@ -306,81 +318,3 @@ def middles_on_linear(blocks: Sequence[Block]) -> IntArray:
     pair = np.sort(quadratic[:, :2], axis=1)
     beside = np.isin(pair[:, 0] * n + pair[:, 1], ends[:, 0] * n + ends[:, 1])
     return np.asarray(quadratic[beside], np.int64)
-
-
-def node_to_cells(blocks: Sequence[Block], n_nodes: int) -> tuple[IntArray, IntArray]:
-    """List the cells around each node.
-
-    Parameters
-    ----------
-    blocks : sequence of (str, (m, n_nodes) int64)
-    n_nodes : int
-        Number of nodes of the mesh.
-
-    Returns
-    -------
-    indptr : (n_nodes + 1,) int64
-    cells : (indptr[-1],) int64
-        Those of node i are ``cells[indptr[i]:indptr[i + 1]]``, increasing.
-    """
-    nodes = [np.zeros(0, np.int64)]
-    numbers = [np.zeros(0, np.int64)]
-    start = 0
-    for _, cells in blocks:
-        nodes.append(cells.ravel())
-        numbers.append(np.repeat(np.arange(start, start + len(cells)), cells.shape[1]))
-        start += len(cells)
-    node, number = np.concatenate(nodes), np.concatenate(numbers)
-    order = np.argsort(node, kind="stable")
-    indptr = np.r_[0, np.cumsum(np.bincount(node, minlength=n_nodes))]
-    return indptr.astype(np.int64), number[order]
-
-
-def node_graph(blocks: Sequence[Block], n_nodes: int) -> sp.csr_array:
-    """Build the graph of the nodes that share a cell.
-
-    Parameters
-    ----------
-    blocks : sequence of (str, (m, n_nodes) int64)
-    n_nodes : int
-
-    Returns
-    -------
-    (n_nodes, n_nodes) csr_array of int32
-        Entry (i, j) counts the cells that hold both nodes; the diagonal counts the cells of a node.
-    """
-    indptr, cells = node_to_cells(blocks, n_nodes)
-    n_cells = sum(len(each) for _, each in blocks)
-    incidence = sp.csr_array((np.ones(len(cells), np.int32), cells, indptr), shape=(n_nodes, n_cells))
-    return sp.csr_array(incidence @ incidence.T)
-
-
-def solids(blocks: Sequence[Block], n_nodes: int) -> tuple[int, IntArray]:
-    """Split the mesh into pieces that share no node.
-
-    Parameters
-    ----------
-    blocks : sequence of (str, (m, n_nodes) int64)
-    n_nodes : int
-
-    Returns
-    -------
-    n_solids : int
-    solid : (n_nodes,) int64
-        Number of the piece of each node, in order of the first node; -1 for a node that no cell uses.
-    """
-    from scipy.sparse.csgraph import connected_components
-
-    indptr, cells = node_to_cells(blocks, n_nodes)
-    n_cells = sum(len(each) for _, each in blocks)
-    if n_cells == 0:
-        return 0, np.full(n_nodes, -1, np.int64)
-    # Nodes and cells are the two sides of one graph, much smaller than the graph of node pairs.
-    rows = np.repeat(np.arange(n_nodes), np.diff(indptr))
-    links = sp.csr_array((np.ones(len(cells), np.int8), (rows, cells + n_nodes)), shape=(n_nodes + n_cells,) * 2)
-    _, label = connected_components(links, directed=False)
-    solid = np.where(np.diff(indptr) > 0, label[:n_nodes], -1)
-    names, first = np.unique(solid[solid >= 0], return_index=True)
-    rank = np.full(label.max() + 1, -1, np.int64)
-    rank[names[np.argsort(first)]] = np.arange(len(names))
-    return len(names), np.where(solid >= 0, rank[solid], -1)

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gibiane.registry import Context
+from gibiane_ops.kernels.connectivity import solids
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.plot import BODY_COLORS, amplification
 from gibiane_ops.kernels.plot.camera import in_space
 from gibiane_ops.kernels.plot.layers import edges_of
 from gibiane_ops.kernels.plot.skin import skin
 from gibiane_ops.kernels.report import Arrows, Body, Field, View
-from gibiane_ops.kernels.topology import solids
 from gibiane_ops.output import scenes
 from gibiane_ops.output.targets import COLOURS
 from gibiane_ops.values.champs import ChPoint, MChaml

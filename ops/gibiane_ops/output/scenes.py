@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gibiane_ops.kernels.connectivity import solids
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.plot.layers import (
     BODY_COLORS,
@@ -26,7 +27,7 @@ from gibiane_ops.kernels.plot.scales import short
 from gibiane_ops.kernels.plot.skin import skin
 from gibiane_ops.kernels.recovery import nodal_mean
 from gibiane_ops.kernels.supports import moved
-from gibiane_ops.kernels.topology import places_in, solids
+from gibiane_ops.kernels.topology import places_in
 from gibiane_ops.output.targets import COLOURS, ink
 from gibiane_ops.values.champs import ChPoint, MChaml
 from gibiane_ops.values.deformee import Shape, Vecteur

@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 from hanging_relations import relation_matrix
 
-from gibiane_ops.kernels import assembly, elasticity, geometry, integrals, topology
-from gibiane_ops.kernels.adapt import halvings, hanging, hierarchy, octree
+from gibiane_ops.kernels import assembly, connectivity, elasticity, geometry, hanging, integrals, topology
+from gibiane_ops.kernels.adapt import halvings, hierarchy, octree
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
@@ -118,7 +118,7 @@ def test_neighbours_differ_by_one_level(dim):
     points, cells = tree.corners
     size = np.linalg.norm(np.ptp(points[cells], axis=1), axis=1)
     assert tree.level.max() >= 2
-    indptr, around = topology.node_to_cells([(NAMES["tensor", dim], cells)], len(points))
+    indptr, around = connectivity.node_to_cells([(NAMES["tensor", dim], cells)], len(points))
     nodes, masters = hanging.hanging_nodes(points, [(NAMES["tensor", dim], cells)])
     # Around the masters of a hanging node stand elements of two neighbouring levels only where they share an edge.
     for node, ends in zip(nodes, masters[:, :2], strict=True):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simplices import grid, outer, round_block, two_blocks
 
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import connectivity, geometry, topology
 from gibiane_ops.kernels.adapt.sizes import predicted_count
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue, MeshingFailed, MissingPackage, MissingSystemLibrary
@@ -116,7 +116,7 @@ def test_tied_volumes_share_their_nodes():
     soft = new.groups["SOFT"]
     assert geometry.measures(TET, new.points[soft]).sum() == pytest.approx(1 / 3, rel=1e-12)
     assert len(outer(new.cells)) < len(outer(soft)) + len(outer(new.cells)) - 2
-    assert topology.solids([("TET4", new.cells)], len(new.points))[0] == 1
+    assert connectivity.solids([("TET4", new.cells)], len(new.points))[0] == 1
 
 
 def test_a_cavity_stays_empty():

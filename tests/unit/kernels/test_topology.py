@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import connectivity, geometry, topology
 from gibiane_ops.kernels.elements.table import shape
 
 # Two unit cubes side by side along x; node numbers i + 3 j + 6 k.
@@ -21,7 +21,7 @@ def test_two_cubes() -> None:
     assert {1, 4, 7, 10} not in [set(face) for face in skin.nodes.tolist()]
     assert topology.neighbours(TWO_CUBES).tolist() == [[0, 1]]
     assert len(topology.edges(TWO_CUBES)) == 20
-    assert topology.solids(TWO_CUBES, 12)[0] == 1
+    assert connectivity.solids(TWO_CUBES, 12)[0] == 1
 
 
 def test_boundary_normals_leave_the_solid() -> None:
@@ -41,6 +41,12 @@ def test_cube_and_prism_share_a_face() -> None:
     assert {name: len(facets.nodes) for name, facets in skin.items()} == {"QUA4": 7, "TRI3": 2}
     assert skin["TRI3"].cell.tolist() == [1, 1]
     assert topology.neighbours(blocks).tolist() == [[0, 1]]
+
+
+def test_cells_of_both_degrees_share_a_facet() -> None:
+    blocks = [("TRI3", np.array([[0, 1, 2]])), ("TRI6", np.array([[0, 2, 3, 4, 5, 6]]))]
+    assert topology.neighbours(blocks).tolist() == [[0, 1]]
+    assert {name: len(facets.nodes) for name, facets in topology.boundary(blocks).items()} == {"SEG2": 2, "SEG3": 2}
 
 
 def test_plane_mesh_has_edges_for_boundary() -> None:
@@ -63,17 +69,17 @@ def test_closed_surface_has_no_boundary() -> None:
 
 def test_cells_around_nodes() -> None:
     blocks = [("TRI3", np.array([[0, 1, 2], [0, 2, 3]])), ("SEG2", np.array([[3, 5]]))]
-    indptr, cells = topology.node_to_cells(blocks, 6)
+    indptr, cells = connectivity.node_to_cells(blocks, 6)
     around = [cells[indptr[i] : indptr[i + 1]].tolist() for i in range(6)]
     assert around == [[0, 1], [0], [0, 1], [1, 2], [], [2]]
-    graph = topology.node_graph(blocks, 6).toarray()
+    graph = connectivity.node_graph(blocks, 6).toarray()
     assert graph[0].tolist() == [2, 1, 2, 1, 0, 0]
     assert graph[5].tolist() == [0, 0, 0, 1, 0, 1]
 
 
 def test_solids_are_numbered_by_their_first_node() -> None:
     blocks = [("SEG2", np.array([[5, 6], [1, 2]])), ("SEG2", np.array([[2, 3]]))]
-    count, solid = topology.solids(blocks, 8)
+    count, solid = connectivity.solids(blocks, 8)
     assert count == 2
     assert solid.tolist() == [-1, 0, 0, 0, -1, 1, 1, -1]
 
@@ -86,7 +92,7 @@ def test_groups_ignore_the_order_of_nodes() -> None:
 
 def test_empty_mesh() -> None:
     assert topology.boundary([]) == {}
-    assert topology.solids([], 3)[0] == 0
+    assert connectivity.solids([], 3)[0] == 0
     assert topology.edges([]).shape == (0, 2)
     assert topology.neighbours([]).shape == (0, 2)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import connectivity, geometry, topology
 from gibiane_ops.kernels.adapt import halvings, octree
 from gibiane_ops.kernels.adapt.octree import Octree
 from gibiane_ops.kernels.adapt.sizes import element_sizes, predicted_count
@@ -201,7 +201,7 @@ def founded(
         A group that is no part of the mesh, a pair that does not match.
     """
     named = {key: np.asarray(group, np.int64) for key, group in (groups or {}).items()}
-    solid = topology.solids([(name, cells)], len(points))[1]
+    solid = connectivity.solids([(name, cells)], len(points))[1]
     merged, _ = pairing.merged_nodes(points, solid, named, pairs)
     tree: Bisection | Octree
     if name in ("TRI3", "TET4"):

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels import topology
+from gibiane_ops.kernels import connectivity, topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.topology import Block
 
@@ -61,7 +61,7 @@ def singular_nodes(
 
 def _densities(n_points: int, blocks: Sequence[Block], error2: FloatArray, measures: FloatArray) -> FloatArray:
     """Divide the squared errors around each node by the measures there."""
-    indptr, cells = topology.node_to_cells(blocks, n_points)
+    indptr, cells = connectivity.node_to_cells(blocks, n_points)
     used = np.flatnonzero(np.diff(indptr))
     result = np.zeros(n_points)
     result[used] = np.add.reduceat(error2[cells], indptr[used]) / np.add.reduceat(measures[cells], indptr[used])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import connectivity, geometry, topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
@@ -151,7 +151,7 @@ def nodal_sizes(
     (n_points,) float64, length
         Infinite at points that no element uses.
     """
-    indptr, cells = topology.node_to_cells(blocks, n_points)
+    indptr, cells = connectivity.node_to_cells(blocks, n_points)
     used = np.flatnonzero(np.diff(indptr))
     result = np.full(n_points, np.inf)
     if smallest_of_star:

@@ -13,7 +13,7 @@ from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.hanging import pieces_of_facets
 from gibiane_ops.kernels.recovery import StressBlock, extrapolate
-from gibiane_ops.kernels.topology import Facets, faces_of, families, group_by_nodes
+from gibiane_ops.kernels.topology import Facets, faces_of, facet_families
 
 INTERIOR = 1.0 / 24.0
 """Constant of the residual inside linear cells; divided by the square of the degree."""
@@ -111,14 +111,13 @@ def residuals(
     degree = np.concatenate([np.full(len(block.cells), block.shape.degree) for block in blocks])
     across, outside = np.zeros(len(young)), np.zeros(len(young))
     every = faces_of([(block.shape.name, block.cells) for block in blocks])
-    for family in families(every):
+    for family, group, first in facet_families(every):
         of = max((shape(name) for name in family), key=lambda each: each.degree)
         found = [_on_facets(every[name], blocks, tensors)[..., :dim, :dim] for name in family]
         T = np.concatenate([_completed(of, values) for values in found])
         X = np.concatenate([_completed(of, points[every[name].nodes]) for name in family])
         corners = np.concatenate([every[name].nodes[:, : of.n_corners] for name in family])
         cell = np.concatenate([every[name].cell for name in family])
-        group, first = group_by_nodes(corners)
         count = np.bincount(group)
         second = np.setdiff1d(np.arange(len(group)), first, assume_unique=True)
         one, two = first[group[second]], second

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import topology
+from gibiane_ops.kernels import connectivity
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.mesh.locate import overshoot, reference_coordinates
@@ -157,7 +157,7 @@ def _take_nearest(search: _Search, lost: IntArray) -> None:
     from scipy.spatial import cKDTree
 
     used = np.unique(np.concatenate([cells.ravel() for _, cells in search.blocks]))
-    around, cells = topology.node_to_cells(search.blocks, len(search.coords))
+    around, cells = connectivity.node_to_cells(search.blocks, len(search.coords))
     _, at = cKDTree(search.coords[used]).query(search.points[lost])
     node = used[at]
     count = around[node + 1] - around[node]

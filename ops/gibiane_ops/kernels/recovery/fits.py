@@ -48,7 +48,7 @@ class Samples:
         ----------
         nodes : (n,) int64
         star : (indptr, cells)
-            Cells around each node, see `topology.node_to_cells`.
+            Cells around each node, see `connectivity.node_to_cells`.
         sampled : list of ((m, k, dim), (m, k, c)) float64
             Places and values in the cells, block after block.
 

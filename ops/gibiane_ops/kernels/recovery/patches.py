@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from gibiane_ops.kernels import topology
+from gibiane_ops.kernels import connectivity, topology
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.recovery.blocks import Recovered, StressBlock
@@ -81,7 +81,7 @@ class Patches:
     own : (p,) int64
         The corners inside, and these that need a patch of their own.
     star : (indptr, cells)
-        Cells around each corner, see `topology.node_to_cells`.
+        Cells around each corner, see `connectivity.node_to_cells`.
     shares : (n_points, p) csr_array
         Share of each patch in the value at each node; rows of nodes sum to 1.
     """
@@ -97,10 +97,10 @@ class Patches:
         used = topology.used_nodes([corners for _, corners in mesh])
         inner, own = patch_nodes(mesh, used, n_points)
         straight = all(shape(name).degree == 1 for name, _ in blocks)
-        graph = topology.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
+        graph = connectivity.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
         weights = lending(graph.astype(bool), used, inner, own)
         shares = sp.csr_array(weights + _middles(blocks, n_points) @ weights)
-        return cls(own, topology.node_to_cells(mesh, n_points), shares)
+        return cls(own, connectivity.node_to_cells(mesh, n_points), shares)
 
     def lent(self, points: FloatArray, fits: Fits) -> FloatArray:
         """Evaluate the polynomials of the patches at the nodes that take them, (n_points, c)."""
@@ -122,7 +122,7 @@ def patch_nodes(mesh: Sequence[Block], used: IntArray, n_points: int) -> tuple[I
     surface = np.concatenate([facets.nodes.ravel() for facets in topology.boundary(mesh).values()])
     inner = np.setdiff1d(used, surface)
     # A piece without any inner corner has no polynomial to borrow: its corners keep their own.
-    count, piece = topology.solids(mesh, n_points)
+    count, piece = connectivity.solids(mesh, n_points)
     has_inner = np.zeros(count, bool)
     has_inner[piece[inner]] = True
     return inner, np.concatenate([inner, used[~has_inner[piece[used]]]])

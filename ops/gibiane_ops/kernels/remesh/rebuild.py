@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from gibiane_ops.kernels import geometry, topology
+from gibiane_ops.kernels import connectivity, geometry, topology
 from gibiane_ops.kernels.adapt.sizes import predicted_count
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
@@ -136,7 +136,7 @@ def remesh(
         raise MeshingFailed(f"elements of the old mesh are flat: {which}")
 
     _check_sides(cells, signed)
-    solid = topology.solids([(CELL[dim], cells)], len(points))[1]
+    solid = connectivity.solids([(CELL[dim], cells)], len(points))[1]
     merged, owners = pairing.merged_nodes(points, solid, named, pairs)
     contacts = [Contact(*names, both) for names, both in zip(pairs, owners, strict=True)]
     common = np.exp(_group_mean(np.log(np.where(np.isfinite(nodal), nodal, 1.0)), merged, used))
