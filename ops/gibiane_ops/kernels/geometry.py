@@ -346,3 +346,20 @@ def facet_normals(shape: Shape, X: FloatArray) -> FloatArray:
     check_cells(shape, X, centre)
     normal = normal_densities(shape, X, centre)[:, 0]
     return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True), np.float64)
+
+
+def vector_area(polygon: FloatArray) -> FloatArray:
+    """Compute the vector area of a closed polygon.
+
+    Parameters
+    ----------
+    polygon : (k, 3) float64, length
+        Its corners in order; it need not be plane.
+
+    Returns
+    -------
+    (3,) float64, length^2
+        Along the normal about which the corners turn.
+    """
+    centred = polygon - polygon.mean(axis=0)
+    return np.asarray(np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0) / 2, np.float64)

@@ -51,7 +51,7 @@ def sizes_at(ctx: Context, size: Size, nodes: IntArray, at: str = "size") -> flo
         )
     values = _everywhere(ctx, size, name, nodes, at)
     if not (values > 0).all():
-        ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=f"{values.min():.6g}")
+        ctx.fail(41, "a size is a length: {value} cannot be one", at=at, value=f"{values.min() + 0.0:.6g}")
     return values if name == "SCAL" else np.asarray(values**-0.5, np.float64)
 
 

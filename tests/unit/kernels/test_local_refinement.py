@@ -9,6 +9,7 @@ from hanging_relations import relation_matrix
 
 from gibiane_ops.kernels import assembly, connectivity, elasticity, geometry, hanging, integrals, topology
 from gibiane_ops.kernels.adapt import halvings, hierarchy, octree
+from gibiane_ops.kernels.adapt.resized import resized
 from gibiane_ops.kernels.elements.quadratic import QUADRATIC
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
@@ -187,7 +188,7 @@ def test_two_divisions_put_back_together_give_the_same_mesh(dim):
     twice = octree.divided(once, np.arange(len(once.root)) == {2: 2, 3: 6}[dim])  # the child in the middle
     fine, rounds = octree.balanced(twice)
     assert rounds >= 1
-    coarse, _ = octree.resized(fine, np.full(len(fine.corners[0]), 0.6))
+    coarse, _ = resized(fine, np.full(len(fine.corners[0]), 0.6))
     assert np.array_equal(coarse.corners[0], first[0])
     assert np.array_equal(coarse.corners[1], first[1])
 

@@ -9,6 +9,7 @@ from hypothesis.extra.numpy import arrays
 from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.adapt import orders as orders_of
 from gibiane_ops.kernels.adapt import sizes
+from gibiane_ops.kernels.adapt.ratios import ratios_by_order, uniform_order_ratios
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
 
@@ -29,7 +30,7 @@ def strip(n):
 
 @given(errors, st.floats(0.3, 3), st.floats(0.001, 10), st.sampled_from([1, 2, 3]))
 def test_uniform_order_meets_the_prescribed_error(error, order, target, dim):
-    r = sizes.uniform_order_ratios(error**2, target, order, dim)
+    r = uniform_order_ratios(error**2, target, order, dim)
     assert (r ** (2 * order) * error**2).sum() == pytest.approx(target**2, rel=1e-12)
 
 
@@ -37,20 +38,20 @@ def test_uniform_order_meets_the_prescribed_error(error, order, target, dim):
 @given(errors, st.floats(0.001, 10), st.sampled_from([2, 3]), st.integers(0, 1000))
 def test_orders_by_element_meet_the_prescribed_error(error, target, dim, seed):
     q = np.random.default_rng(seed).uniform(0.3, 3, len(error))
-    r = sizes.ratios_by_order(error**2, target, q, dim)
+    r = ratios_by_order(error**2, target, q, dim)
     assert (r ** (2 * q) * error**2).sum() == pytest.approx(target**2, rel=1e-12)
 
 
 @given(errors, st.floats(0.3, 3), st.floats(0.001, 10))
 def test_equal_orders_give_the_uniform_formula(error, order, target):
-    together = sizes.ratios_by_order(error**2, target, np.full(len(error), order), 3)
-    np.testing.assert_allclose(together, sizes.uniform_order_ratios(error**2, target, order, 3), rtol=1e-11)
+    together = ratios_by_order(error**2, target, np.full(len(error), order), 3)
+    np.testing.assert_allclose(together, uniform_order_ratios(error**2, target, order, 3), rtol=1e-11)
 
 
 def test_no_other_sizes_meet_the_error_with_fewer_elements():
     rng = np.random.default_rng(0)
     error2, q = rng.uniform(0.1, 1, 30) ** 2, rng.uniform(0.5, 2, 30)
-    best = sizes.ratios_by_order(error2, 0.3, q, 3)
+    best = ratios_by_order(error2, 0.3, q, 3)
     for _ in range(100):
         other = best * np.exp(0.1 * rng.normal(size=30))
         low, high = 0.1, 10.0  # scale the disturbed sizes back to the prescribed error
@@ -61,7 +62,7 @@ def test_no_other_sizes_meet_the_error_with_fewer_elements():
 
 
 def test_an_element_without_error_has_a_size():
-    r = sizes.uniform_order_ratios(np.array([0.0, 1.0, 1.0]), 0.5, 1.0, 3)
+    r = uniform_order_ratios(np.array([0.0, 1.0, 1.0]), 0.5, 1.0, 3)
     assert np.isfinite(r).all()
     assert r[0] > r[1]
 
@@ -203,14 +204,12 @@ def test_equal_errors_are_equal_and_take_more_elements_where_orders_differ():
     rng = np.random.default_rng(4)
     error2 = rng.uniform(0.1, 1, 40)
     orders = np.where(np.arange(40) < 8, 0.5, 1.0)
-    fewest = sizes.ratios_by_order(error2, 0.5, orders, 2)
-    equal = sizes.ratios_by_order(error2, 0.5, orders, 2, equal=True)
+    fewest = ratios_by_order(error2, 0.5, orders, 2)
+    equal = ratios_by_order(error2, 0.5, orders, 2, equal=True)
     for ratios in (fewest, equal):
         assert (ratios ** (2 * orders) * error2).sum() == pytest.approx(0.25, rel=1e-12)
     each = equal ** (2 * orders + 2) * error2  # error of a new element: r^d of them share what an old one keeps
     assert np.ptp(each) <= 1e-12 * each.max()
     assert (equal**-2.0).sum() > (fewest**-2.0).sum()
     same = np.full(40, 1.0)
-    assert np.allclose(
-        sizes.ratios_by_order(error2, 0.5, same, 2, equal=True), sizes.ratios_by_order(error2, 0.5, same, 2)
-    )
+    assert np.allclose(ratios_by_order(error2, 0.5, same, 2, equal=True), ratios_by_order(error2, 0.5, same, 2))

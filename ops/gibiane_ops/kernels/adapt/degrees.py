@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels import topology
-from gibiane_ops.kernels.adapt.sizes import FLOOR, SizeMap, size_map
+from gibiane_ops.kernels.adapt.ratios import FLOOR
+from gibiane_ops.kernels.adapt.sizes import SizeMap, size_map
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import BadValue
 from gibiane_ops.kernels.topology import Block

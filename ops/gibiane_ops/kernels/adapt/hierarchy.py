@@ -10,6 +10,7 @@ import numpy as np
 from gibiane_ops.kernels import connectivity, geometry, topology
 from gibiane_ops.kernels.adapt import halvings, octree
 from gibiane_ops.kernels.adapt.octree import Octree
+from gibiane_ops.kernels.adapt.resized import resized
 from gibiane_ops.kernels.adapt.sizes import element_sizes, predicted_count
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
@@ -291,4 +292,4 @@ def _count(tree: Bisection | Octree) -> int:
 
 
 def _resized(tree: Bisection | Octree, sizes: FloatArray) -> Bisection | Octree:
-    return halvings.adapted(tree, sizes) if isinstance(tree, Bisection) else octree.resized(tree, sizes)[0]
+    return halvings.adapted(tree, sizes) if isinstance(tree, Bisection) else resized(tree, sizes)[0]

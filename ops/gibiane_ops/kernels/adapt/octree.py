@@ -10,8 +10,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gibiane_ops.kernels import geometry, hanging
-from gibiane_ops.kernels.adapt.sizes import element_sizes
+from gibiane_ops.kernels import hanging
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import BadValue
@@ -282,61 +281,3 @@ def merged_back(mesh: Octree, willing: BoolArray) -> tuple[Octree, IntArray]:
     level = np.where(heads, mesh.level - 1, mesh.level)
     corner = np.where(heads[:, None], mesh.corner >> 1, mesh.corner)
     return replace(mesh, root=mesh.root[keep], level=level[keep], corner=corner[keep]), place
-
-
-def resized(mesh: Octree, sizes: FloatArray) -> tuple[Octree, int]:
-    """Put together and divide until elements have the sizes asked for, within the factor that a division leaves.
-
-    Parameters
-    ----------
-    mesh : Octree
-    sizes : (n,) float64, length
-        Edge wanted at the nodes of ``mesh.corners``.
-
-    Returns
-    -------
-    mesh : Octree
-        Balanced.
-    rounds : int
-        Rounds of `balanced` that divided something.
-
-    Notes
-    -----
-    An element is divided above sqrt(2) times the size asked at its nodes (geometric mean), its children all taking
-    what its trilinear interpolation gives; children go below its inverse.
-    """
-    of = shape(NAMES[2**mesh.dim])
-    slack = np.sqrt(2.0)
-    _, cells = mesh.corners
-    asked = np.log(sizes)[cells]
-
-    def log_ratio(state: Octree, nodal: FloatArray) -> FloatArray:
-        points, each = state.corners
-        present = element_sizes(of, np.abs(geometry.measures(of, points[each])))
-        return np.asarray(np.log(present) - nodal.mean(axis=1), np.float64)
-
-    while True:
-        mesh, place = merged_back(mesh, log_ratio(mesh, asked) <= -np.log(slack))
-        if len(mesh.root) == len(place):
-            break
-        count = np.bincount(place)[:, None]
-        asked = np.stack([np.bincount(place, each) for each in asked.T], axis=1) / count
-    while True:
-        marked = log_ratio(mesh, asked) > np.log(slack)
-        if not marked.any():
-            break
-        asked = _children(mesh, marked, asked)
-        mesh = divided(mesh, marked)
-    return balanced(mesh)
-
-
-def _children(mesh: Octree, marked: BoolArray, values: FloatArray) -> FloatArray:
-    """Interpolate values at the corners of elements to those of their children."""
-    of, corner = shape(NAMES[2**mesh.dim]), offsets(mesh.dim)
-    places = (corner[:, None, :] + corner[None, :, :]) - 1.0  # corners of child i in the element, -1 to 1
-    N = of.N(np.asarray(places, np.float64).reshape(-1, mesh.dim)).reshape(len(corner), len(corner), -1)
-    new = np.einsum("ijc,mc->mij", N, values[marked])
-    times = np.where(marked, len(corner), 1)
-    result = values[np.repeat(np.arange(len(marked)), times)]
-    result[marked[np.repeat(np.arange(len(marked)), times)]] = new.reshape(-1, len(corner))
-    return result

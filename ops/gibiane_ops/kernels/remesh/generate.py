@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gibiane_ops.kernels import geometry
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.errors import MeshingFailed
 from gibiane_ops.kernels.remesh.session import (
@@ -139,14 +140,8 @@ def _loops(skeleton: Skeleton, border: list[int]) -> list[list[tuple[int, bool]]
             k = following[0]
         loops.append(loop)
     corners = [[skeleton.points[skeleton.chains[k][0 if forward else -1]] for k, forward in loop] for loop in loops]
-    areas = [np.linalg.norm(_area(np.array(polygon))) for polygon in corners]
+    areas = [np.linalg.norm(geometry.vector_area(np.array(polygon))) for polygon in corners]
     return [loops[i] for i in np.argsort(-np.array(areas), kind="stable")]
-
-
-def _area(polygon: FloatArray) -> FloatArray:
-    """Return the vector area of a closed polygon."""
-    centred = polygon - polygon.mean(axis=0)
-    return np.asarray(np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0) / 2, np.float64)
 
 
 def _discrete_entities(gmsh: Any, skeleton: Skeleton) -> None:

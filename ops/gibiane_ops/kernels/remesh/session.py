@@ -147,6 +147,11 @@ def set_size_field(gmsh: Any, points: FloatArray, cells: IntArray, sizes: FloatA
     view = gmsh.view.add("size")
     data = np.hstack([points[cells].transpose(0, 2, 1).reshape(m, 3 * n), sizes[cells]])
     gmsh.view.addListData(view, {3: "ST", 4: "SS"}[n], m, data.ravel())
+    _follow(gmsh, view)
+
+
+def _follow(gmsh: Any, view: int) -> None:
+    """Make a view the background mesh; a point outside of it takes the value of the nearest node."""
     field = gmsh.model.mesh.field.add("PostView")
     gmsh.model.mesh.field.setNumber(field, "ViewTag", view)
     gmsh.model.mesh.field.setNumber(field, "UseClosest", 1)
@@ -183,10 +188,7 @@ def set_metric_field(gmsh: Any, points: FloatArray, cells: IntArray, metric: Flo
     view = gmsh.view.add("metric")
     data = np.hstack([points[cells].transpose(0, 2, 1).reshape(m, 9), full[cells].reshape(m, 27)])
     gmsh.view.addListData(view, "TT", m, data.ravel())
-    field = gmsh.model.mesh.field.add("PostView")
-    gmsh.model.mesh.field.setNumber(field, "ViewTag", view)
-    gmsh.model.mesh.field.setNumber(field, "UseClosest", 1)
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
+    _follow(gmsh, view)
 
 
 def set_constant_size(gmsh: Any, size: float) -> None:
