@@ -44,11 +44,11 @@ def patch_recovery(
     About each corner node inside the solid, the polynomial nearest (least squares) to the stresses at the
     superconvergent points of its elements: linear for linear elements, with all 6 or 10 quadratic terms for elements
     of second degree (linear where the two kinds meet). A corner of the surface takes the mean of the polynomials of
-    the inner corners that share an element with it, or those of the next ring of corners, and so on: a patch of its
-    own would be one-sided and often of deficient rank. With elements of second degree they share an edge with it,
-    which in bricks leaves the nearest: a parabola goes wrong faster away from its patch. Only in a piece without any
-    inner corner does a corner of the surface use its own elements. A mid-node takes the mean of what the two ends of
-    its edge use.
+    the inner corners that share an element with it, or those of the next ring of corners, in space of the third: a
+    patch of its own would be one-sided and often of deficient rank. With elements of second degree they share an edge
+    with it, which in bricks leaves the nearest: a parabola goes wrong faster away from its patch. Only farther from any
+    inner corner, in thin parts, does a corner of the surface use its own elements: of what is lent there the errors
+    grow with the distance, or its square. A mid-node takes the mean of what the two ends of its edge use.
 
     Source
     ------
@@ -95,10 +95,10 @@ class Patches:
         """Place the patches of the elements of one solid."""
         mesh = topology.corner_blocks(blocks)
         used = topology.used_nodes([corners for _, corners in mesh])
-        inner, own = patch_nodes(mesh, used, n_points)
         straight = all(shape(name).degree == 1 for name, _ in blocks)
-        graph = connectivity.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)
-        weights = lending(graph.astype(bool), used, inner, own)
+        graph = (connectivity.node_graph(mesh, n_points) if straight else _edge_graph(mesh, n_points)).astype(bool)
+        inner, own = patch_nodes(mesh, used, graph)
+        weights = lending(graph, used, inner, own)
         shares = sp.csr_array(weights + _middles(blocks, n_points) @ weights)
         return cls(own, connectivity.node_to_cells(mesh, n_points), shares)
 
@@ -117,15 +117,17 @@ def lower_to_elements(degree: IntArray, blocks: Sequence[StressBlock]) -> None:
         degree[block.cells] = np.minimum(degree[block.cells], block.shape.degree)
 
 
-def patch_nodes(mesh: Sequence[Block], used: IntArray, n_points: int) -> tuple[IntArray, IntArray]:
+def patch_nodes(mesh: Sequence[Block], used: IntArray, graph: sp.csr_array) -> tuple[IntArray, IntArray]:
     """Return the corners inside the solid, and these with the corners that need a patch of their own."""
     surface = np.concatenate([facets.nodes.ravel() for facets in topology.boundary(mesh).values()])
     inner = np.setdiff1d(used, surface)
-    # A piece without any inner corner has no polynomial to borrow: its corners keep their own.
-    count, piece = connectivity.solids(mesh, n_points)
-    has_inner = np.zeros(count, bool)
-    has_inner[piece[inner]] = True
-    return inner, np.concatenate([inner, used[~has_inner[piece[used]]]])
+    # Far from any inner corner, in thin parts, there is no polynomial to borrow: one has as many rings as the
+    # corner of a box needs to reach its inside along edges.
+    near = np.zeros(graph.shape[0], bool)
+    near[inner] = True
+    for _ in range(shape(mesh[0][0]).dim):
+        near = graph @ near
+    return inner, np.concatenate([inner, used[~near[used]]])
 
 
 def _edge_graph(mesh: Sequence[Block], n_points: int) -> sp.csr_array:
