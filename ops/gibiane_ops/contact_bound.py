@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
@@ -11,36 +11,32 @@ from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
 from gibiane_ops.kernels.elements.table import shape
-from gibiane_ops.kernels.estimate.bodies import loose_motions
 from gibiane_ops.kernels.estimate.contact_bound import VIOLATION, ContactTractions, contact_tractions
 from gibiane_ops.kernels.estimate.cutting import CORNERS
 from gibiane_ops.kernels.estimate.joints import Joint
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
-from gibiane_ops.values.contact import DISPLACEMENT, SolvedContact, nodal_property, solved_contacts
+from gibiane_ops.values.contact import SolvedContact, nodal_property, solved_contacts
 from gibiane_ops.values.contact_estimates import (
     check_energy,
     contact_operands,
     contact_results,
     facet_zones,
-    partners,
     shared_out,
 )
+from gibiane_ops.values.contact_surface import CLOSED, Surface, lost, surface_of
 from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
 from gibiane_ops.values.estimates import NORM, REFE, TABL, stresses_of
-from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior, held_at, held_directions
+from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.listes import ListReel
 from gibiane_ops.values.maillage import Point
 from gibiane_ops.values.material import solid_zones
 from gibiane_ops.values.modele import Modele
-from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
+from gibiane_ops.values.nodes import FloatArray, IntArray
 from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, doubts_of, fields_of, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
-CLOSED = 1e-9
-"""Largest opening of a closed pair, over the largest relative displacement."""
-
 FLAT = 1e-6
 """Largest angle between the normals of facets and nodes of a contact surface that counts as plane."""
 
@@ -48,7 +44,7 @@ FLAT = 1e-6
 @ERRE.form(
     Key("CONTACT", "with the contact part", required=True),
     Key("RDC", "constitutive relation error", required=True),
-    Arg("model", MMODEL, "solids of linear elements; other elements than simplices are cut"),
+    Arg("model", MMODEL, "solids; other elements than linear simplices are cut"),
     Arg("sig", MCHAML, "stress"),
     Arg("mat", MCHAML, "material"),
     Arg("mc", MMODEL, "contact model", optional=True),
@@ -102,7 +98,8 @@ def _bound_with_contact(
             "estimates the error on any meshes",
         )
     pairs = np.concatenate([np.zeros((0, 2), np.int64), *(s.pairs.pairs for s in states)])
-    pieces = pieces_of(ctx, zones, pairs, CORNERS)
+    _check_friction(ctx, states)
+    pieces = pieces_of(ctx, zones, pairs, None if any(shape(z.shape).degree > 1 for z in zones) else CORNERS)
     check_balance(ctx, pieces, stress, outside, volu, cl, [each for s in states for each in _forces(s)])
     fields = fields_of(ctx, pieces, stress, material)
     boundary = cut_sides(ctx, pieces, outside, fields)
@@ -113,12 +110,15 @@ def _bound_with_contact(
     doubts: list[str] = []
     squares: list[list[FloatArray]] = []
     nodal = True
-    for state in states:
-        found, each = _tractions(ctx, state, given.law, pieces, sides, cl)
+    surfaces = [surface_of(ctx, state, given.law, pieces, cl) for state in states]
+    for state, surface in zip(states, surfaces, strict=True):
+        found, each = _tractions(ctx, surface, pieces, sides)
         nodal = nodal and found.nodal
         squares.append(each)
         doubts += _doubts(ctx, state, given.law, found)
-    joint, parts = _joint(ctx, states, given.law, pieces, sides[0], squares)
+        if surface.quadratic and surface.opens_in_part(found.traction):
+            doubts.append("quadratic contact facets are open in part, and may overlap between their nodes")
+    joint, parts = _joint(states, surfaces, pieces, sides[0], squares)
     solid = equilibrated(ctx, pieces, stress, material, fields, boundary, volu, sweeps, cl, joint, nodal)
     for (square, owner), change in zip(parts, np.split(solid.contact, _ends(parts)), strict=bool(len(solid.contact))):
         np.add.at(square, owner, change)
@@ -138,6 +138,20 @@ def _bound_with_contact(
     return contact_results(ctx, parts_of(pieces, solid), totals, norm, tabl, guarantee, facets, refe, more)
 
 
+def _check_friction(ctx: Context, states: Sequence[SolvedContact]) -> None:
+    """Refuse friction on quadratic facets: the length of their slips is no polynomial."""
+    for state in states:
+        wrong = next((b.shape for b in state.zone.slave.blocks if shape(b.shape).degree > 1), None)
+        if wrong is not None and state.zone.law != "UNILATERAL":
+            ctx.fail(
+                251,
+                "with friction contact tractions in balance stand on facets of linear elements only, not on {shape}",
+                at="mc",
+                shape=wrong,
+                hint="without friction ('UNILATERAL') on any; ERREUR 'CONTACT' without 'RDC' gives no bound",
+            )
+
+
 def _forces(state: SolvedContact) -> list[tuple[IntArray, FloatArray]]:
     """Return the contact forces at the nodes of both surfaces, in global axes."""
     slave, master = state.pairs.pairs.T
@@ -147,75 +161,32 @@ def _forces(state: SolvedContact) -> list[tuple[IntArray, FloatArray]]:
 
 
 def _tractions(
-    ctx: Context, state: SolvedContact, law: MChaml, pieces: Pieces, sides: list[Side], supports: Rigidite | None
+    ctx: Context, surface: Surface, pieces: Pieces, sides: list[Side]
 ) -> tuple[ContactTractions, list[FloatArray]]:
     """Find the contact tractions of a zone and put them on both of its surfaces; twice the errors of its facets."""
-    store, dim = node_store(ctx), state.frames.shape[1]
-    name = "TRI3" if dim == 3 else "SEG2"
-    wrong = next((b.shape for b in state.zone.slave.blocks if shape(b.shape).degree > 1), None)
-    if wrong is not None:
-        ctx.fail(
-            251,
-            "contact tractions in balance are built on facets of linear elements only, not on {shape}",
-            at="mc",
-            shape=wrong,
-        )
-    slave, master = state.pairs.pairs.T
-    lost = sum(int((~np.isin(b.cells, pieces.nodes)).any(axis=1).sum()) for b in state.zone.slave.blocks)
-    if lost:
-        _lost(ctx, lost)
-    cuts = [(b.cells, *pieces.facets(b.shape, b.cells)) for b in state.zone.slave.blocks]
-    cells = np.concatenate([each for _, each, _, _ in cuts])
-    known = held_directions(store, supports, DISPLACEMENT[:dim], dim)
-    # A support holds an axis of both nodes of a pair; an obstacle (-1) needs no balance of its own.
-    sure = np.diagonal(held_at(*known, slave), axis1=1, axis2=2) > 1 - ROUND_OFF
-    sure &= (np.diagonal(held_at(*known, master), axis1=1, axis2=2) > 1 - ROUND_OFF) | (master < 0)[:, None]
-    values = law.zone_of(state.zone)
-    threshold = nodal_property(ctx, values, "SEUI", slave) if state.zone.law == "TRESCA" else None
+    name = "TRI3" if pieces.zones[0].dim == 3 else "SEG2"
     with worded(ctx, at="mc"):
         found = contact_tractions(
             pieces.cutting.points,
-            cells,
-            pieces.places(slave),
-            state.frames,
-            state.force,
-            state.relative,
-            state.gap,
-            np.zeros(len(slave)) if state.zone.law == "TRESCA" else state.mu,
-            np.zeros(len(slave)) if threshold is None else threshold,
-            sure,
-            _motions(ctx, state, pieces, supports),
+            surface.cells,
+            surface.points,
+            surface.frames,
+            surface.force,
+            surface.relative,
+            surface.gap,
+            surface.mu,
+            surface.threshold,
+            surface.sure,
+            surface.motions,
         )
-    lost = len(cells) - add_tractions(sides, name, cells, found.traction)
-    facing = partners(ctx, state)[pieces.nodes[pieces.cutting.node[cells]]]
-    both = (facing >= 0).all(axis=1)
-    there = pieces.places(facing[both])
-    lost += len(there) - add_tractions(sides, name, there, -found.traction[both])
-    if lost:
-        _lost(ctx, lost)
-    parts = np.split(2 * found.facet, np.cumsum([len(owner) for *_, owner in cuts])[:-1])
-    return found, [np.bincount(o, p, len(c)).astype(np.float64) for (c, *_, o), p in zip(cuts, parts, strict=True)]
-
-
-def _lost(ctx: Context, count: int) -> NoReturn:
-    ctx.fail(
-        251,
-        "{count} contact facets have no facet of a solid with the same nodes: tractions cannot be opposite there",
-        at="mc",
-        count=count,
-        hint="mesh the contact surface once, copy it for the other solid, and cut both alike",
-    )
-
-
-def _motions(ctx: Context, state: SolvedContact, pieces: Pieces, supports: Rigidite | None) -> FloatArray:
-    """Return the relative displacements of the pairs in the rigid motions that supports leave to each body."""
-    dim = pieces.zones[0].dim
-    points = node_store(ctx).coords[pieces.nodes][:, :dim]
-    held = held_at(*held_directions(node_store(ctx), supports, DISPLACEMENT[:dim], dim), pieces.nodes)
-    motions = loose_motions(points, pieces.cells, held)
-    slave, master = state.pairs.pairs.T
-    one, two = np.searchsorted(pieces.nodes, slave), np.searchsorted(pieces.nodes, np.maximum(master, 0))
-    return motions[:, one] - np.where((master >= 0)[:, None], motions[:, two], 0.0)
+    count = len(surface.cells) - add_tractions(sides, name, surface.cells, found.traction)
+    both = (surface.facing >= 0).all(axis=1)
+    there = surface.facing[both]
+    count += len(there) - add_tractions(sides, name, there, -found.traction[both])
+    if count:
+        lost(ctx, count)
+    parts = np.split(2 * found.facet, np.cumsum([len(owner) for owner in surface.owner])[:-1])
+    return found, [np.bincount(o, p).astype(np.float64) for o, p in zip(surface.owner, parts, strict=True)]
 
 
 Parts = list[tuple[FloatArray, IntArray]]
@@ -227,9 +198,8 @@ def _ends(parts: Parts) -> IntArray:
 
 
 def _joint(
-    ctx: Context,
     states: Sequence[SolvedContact],
-    law: MChaml,
+    surfaces: Sequence[Surface],
     pieces: Pieces,
     side: Side,
     squares: list[list[FloatArray]],
@@ -245,29 +215,25 @@ def _joint(
     points = pieces.cutting.points
     name, parts = np.arange(len(points)), Parts()
     facets, bounds, slips = [np.zeros((0, dim), np.int64)], [np.zeros((0, dim))], [np.zeros((0, dim, dim))]
-    for state, own in zip(states, squares, strict=True):
+    for state, surface, own in zip(states, surfaces, squares, strict=True):
         if state.zone.law not in ("UNILATERAL", "TRESCA"):
             continue
-        slave, master = state.pairs.pairs.T
-        one, two = (pieces.places(ends) for ends in (slave, np.where(master < 0, slave, master)))
+        one, two = surface.points, np.where(surface.partner < 0, surface.points, surface.partner)
         held, touching = np.zeros((2, len(points)), bool)
         touching[one], touching[two] = True, True
         held[fixed[touching[fixed].all(axis=1)]] = True
-        open_by = np.abs(state.relative[:, 0] - state.gap)
         size = float(np.ptp(points, axis=0).max())
-        shut = (open_by <= CLOSED * np.abs(state.relative).max()) & (state.force[:, 0] < 0)
-        shut &= np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size
+        shut = surface.closed & (np.abs(points[one] - points[two]).max(axis=1) <= CLOSED * size)
         shut &= ~(held[one] | held[two])
         name[one[shut]] = two[shut]
         closed, bound = np.zeros(len(points), bool), np.full(len(points), np.inf)
         slip = np.zeros((len(points), dim))
         closed[one[shut]] = True
-        threshold = nodal_property(ctx, law.zone_of(state.zone), "SEUI", slave)
-        if state.zone.law == "TRESCA" and threshold is not None:
-            bound[one] = threshold
-            slip[one] = np.einsum("nij,ni->nj", state.frames[:, 1:], state.relative[:, 1:])
-        for block, square in zip(state.zone.slave.blocks, own, strict=True):
-            cells, _, owner = pieces.facets(block.shape, block.cells)
+        if state.zone.law == "TRESCA":
+            bound[one] = surface.threshold
+            slip[one] = np.einsum("nij,ni->nj", surface.frames[:, 1:], surface.relative[:, 1:])
+        cuts = np.cumsum([len(owner) for owner in surface.owner])[:-1]
+        for cells, owner, square in zip(np.split(surface.cells, cuts), surface.owner, own, strict=True):
             kept = closed[cells].all(axis=1)
             cells = cells[kept]
             facets.append(name[cells])

@@ -95,6 +95,11 @@ class Parts:
         given = np.einsum("ab,kbi->kai", np.linalg.inv(moments(dim)), moment) / area[:, None, None]
         return given, np.abs(inside @ given - values).max(axis=(1, 2), initial=0.0)
 
+    def moments(self, traction: FloatArray) -> FloatArray:
+        """Return ``int t N_a`` at the corners of the sides, (k, d, d), from tractions at the nodes of the facets."""
+        given, _ = self.linear(traction)
+        return np.asarray(np.einsum("k,ab,kbi->kai", self.areas(), moments(self.X.shape[2]), given), np.float64)
+
     def areas(self) -> FloatArray:
         """Return the measures of the sides, (k,)."""
         along = self.corners[:, 1:] - self.corners[:, :1]
