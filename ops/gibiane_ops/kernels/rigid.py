@@ -13,6 +13,9 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 SEEN = 1e-7
 _AXES = "xyz"
 
+ROUND_OFF = 1e-11
+"""Work of the stiffness in a motion, over that of its diagonal alone, that is none."""
+
 
 def rigid_modes(points: FloatArray, centre: FloatArray | None = None) -> FloatArray:
     """Build the rigid-body modes of a cloud of points.
@@ -138,12 +141,13 @@ def _direction(vector: FloatArray) -> str:
 
 
 def free_motions(K: sp.sparray, points: FloatArray, C: sp.sparray) -> list[FreeMotion]:
-    """Find the rigid motions of solids that the conditions do not stop.
+    """Find the rigid motions of solids that neither the conditions nor springs stop.
 
     Parameters
     ----------
     K : (n * dim, n * dim) sparse, symmetric
-        Stiffness; a solid is a set of nodes that it connects, a node without stiffness belongs to none.
+        Stiffness; a solid is a set of nodes that it connects, a node without stiffness belongs to none. Springs to the
+        ground are in it: a motion that they resist is not free.
     points : (n, dim) float64, length
     C : (m, n * dim) sparse
         All conditions ``C u = d`` as given by the user. Rows that tie two solids, or that stand for contact pairs
@@ -185,7 +189,8 @@ def free_motions(K: sp.sparray, points: FloatArray, C: sp.sparray) -> list[FreeM
         unknowns = (members[:, None] * n_modes + np.arange(n_modes)).ravel()
         conditions = np.flatnonzero(label[n_solids:] == name)
         stopped = [seen[conditions][:, unknowns].toarray(), _still(gram[unknowns][:, unknowns].toarray())]
-        basis = _readable(_null_space(np.concatenate(stopped)), dim, n_modes)
+        free = _effortless(K, modes[:, unknowns], _null_space(np.concatenate(stopped)))
+        basis = _readable(free, dim, n_modes)
         for motion in basis.T.reshape(-1, len(members), n_modes):
             found.append(_describe(motion, members, solid, centres, radii))
     return sorted(found, key=lambda motion: (motion.solids, bool(motion.rotation.any())))
@@ -247,6 +252,19 @@ def _still(gram: FloatArray) -> FloatArray:
     """Return the combinations of modes that move no node, by rows: rotations of a bar about itself, of a point."""
     values, vectors = np.linalg.eigh(gram)
     return np.asarray(vectors[:, values <= SEEN**2 * values[-1]].T, np.float64)
+
+
+def _effortless(K: sp.sparray, modes: sp.csr_array, basis: FloatArray) -> FloatArray:
+    """Keep the combinations, (n_modes, k), of motions that the stiffness does not resist."""
+    if basis.shape[1] == 0:
+        return basis
+    motions = modes @ basis
+    work = motions.T @ (K @ motions)
+    # no motion of solids works: what is left of large terms that cancel
+    scale = np.sqrt((K.diagonal()[:, None] * motions**2).sum(axis=0))
+    values, vectors = np.linalg.eigh(work / np.outer(scale, scale))
+    kept = vectors[:, values <= ROUND_OFF] / scale[:, None]
+    return np.asarray(np.linalg.qr(basis @ kept)[0], np.float64) if kept.shape[1] else basis[:, :0]
 
 
 def _null_space(A: FloatArray) -> FloatArray:

@@ -55,6 +55,24 @@ def test_rotation_turns_counterclockwise() -> None:
     assert np.array_equal(in_plane, about_z[:2, :2])
 
 
+@pytest.mark.parametrize("stiffness", [1e-6, 1.0, 1e6])
+def test_springs_stop_motions(stiffness) -> None:
+    K, points = cubes(2)
+    springs = np.zeros(len(points) * 3)
+    springs[[3 * node for node in BOTTOM]] = stiffness
+    none = sp.csr_array((0, K.shape[0]))
+    left = free_motions(sp.csr_array(K + sp.diags_array(springs)), points, none)
+    # x of the four nodes below: the first cube may not go along x, nor turn about z; about y it turns in their plane
+    first = [m for m in left if m.solids == (0,)]
+    assert [m.kind for m in first] == ["translation", "translation", "rotation", "rotation"]
+    assert not any(m.translation[0] for m in first[:2])
+    assert [abs(m.axis_point[2]) < 1e-9 for m in first[2:]] == [False, True]
+    assert len(left) == 10
+    springs[[3 * 0 + 1, 3 * 0 + 2, 3 * 1 + 2, 3 * 3 + 2]] = stiffness
+    left = free_motions(sp.csr_array(K + sp.diags_array(springs)), points, none)
+    assert {m.solids for m in left} == {(1,)}
+
+
 def test_clamped_cube_is_held() -> None:
     assert motions(1, *held(BOTTOM, "xyz")) == []
 
