@@ -82,6 +82,25 @@ def test_bound_per_tetrahedron_and_sweep(bench):
 
 
 @pytest.mark.bench
+def test_bound_of_elements_that_are_cut(bench):
+    text = "T = ERREUR 'RDC' MO SIG MA CL 'PRES' 1. HAUT 'TABL' ;"
+    quadratic = (
+        "V = CHAN 'QUADRATIQUE' V ; E = ENVE V ; Z = COOR 3 E ; HAUT = E ELEM 'APPU' 'STRI' (Z POIN 'EGSUPE' 0.999) ;"
+    )
+    quadratic += " BAS = E ELEM 'APPU' 'STRI' (Z POIN 'EGINFE' 0.001) ;"
+    few = 6 * 8**3
+    peer = {f"{few} TET4": runs(session_of(CUBE.format(n=8, cut=CUT)), text)}
+    # bricks in six tetrahedra, quadratic ones in 24, quadratic tetrahedra in eight
+    for name, n, cut, pieces in (
+        ("CUB8", 8, "", 6 * 8**3),
+        ("CU20", 5, quadratic, 24 * 5**3),
+        ("TE10", 4, "V = CHAN TET4 V ; " + quadratic, 48 * 4**3),
+    ):
+        run = runs(session_of(CUBE.format(n=n, cut=cut)), text)
+        bench.compare("RDC, cost per piece", f"{name} in {pieces}", run, peer, aim=2.0, rounds=1, scale=pieces / few)
+
+
+@pytest.mark.bench
 def test_cost_against_effectivity(bench):
     texts = {name: f"T = ERREUR '{name}' MO SIG MA 'TABL' 'REFE' {EXACT} ;" for name in ("MOYE", "MOYC", "PROJ", "SPR")}
     texts["SPRE"] = f"T = ERREUR MO SIG MA (LISSER 'SPRE' MO SIG CL 'PRES' 1. HAUT) 'TABL' 'REFE' {EXACT} ;"

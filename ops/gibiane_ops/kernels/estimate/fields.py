@@ -52,7 +52,7 @@ class Field:
     law: FloatArray
     misfit: float
 
-    def strains(self, cells: IntArray, x: FloatArray, guess: FloatArray) -> FloatArray:
+    def strains(self, cells: IntArray, x: FloatArray, guess: FloatArray, alike: IntArray | None = None) -> FloatArray:
         """Evaluate strains at points of elements.
 
         Parameters
@@ -63,6 +63,8 @@ class Field:
             Points of each; outside of the element its polynomials go on.
         guess : (k, p, d) float64
             Their reference coordinates, exact where the map is affine.
+        alike : (k,) int64, optional
+            The same number for those of the same reference coordinates, whose functions are evaluated once.
 
         Returns
         -------
@@ -82,7 +84,14 @@ class Field:
             some = np.flatnonzero(rows)
             if len(some):
                 xi[some] = located(of, self.X[cells[some], : of.n_nodes], x[some], guess[some])
-        slope = self.of.dN(xi.reshape(-1, dim)).reshape(k, p, -1, dim).swapaxes(1, 2).reshape(k, -1, p * dim)
+        number = (
+            np.arange(k)
+            if alike is None
+            else np.where(self.affine[cells], alike, alike.max(initial=0) + 1 + np.arange(k))
+        )
+        _, first, same = np.unique(number, return_index=True, return_inverse=True)
+        slope = self.of.dN(xi[first].reshape(-1, dim)).reshape(len(first), p, -1, dim).swapaxes(1, 2)
+        slope = slope.reshape(len(first), -1, p * dim)[same]
         both = np.concatenate([self.X[cells], self.U[cells]], axis=2).swapaxes(1, 2)
         found = np.matmul(both, slope).reshape(k, 2, dim, p, dim)
         J, H = (found[:, i].swapaxes(1, 2) for i in (0, 1))

@@ -176,9 +176,10 @@ def _integrated(
     parts[range(n), range(n)] = 1.0 / n
     bary = np.einsum("qp,kpc->kqc", inside, parts).reshape(-1, n)
     step = max(CHUNK // len(bary), 1)
+    alike = np.unique(np.round(at.reshape(len(at), n * dim), 12), axis=0, return_inverse=True)[1].reshape(-1)
     for start in range(0, len(owner), step):
         some = slice(start, start + step)
-        strain = field.strains(owner[some], bary @ corners[some], bary @ at[some])
+        strain = field.strains(owner[some], bary @ corners[some], bary @ at[some], alike[some])
         values = np.matmul(strain, field.law[owner[some]]).reshape(-1, n, len(rule.weights), n_s)
         mean = np.einsum("q,mkqs->ms", weight, values)
         values = values - mean[:, None, None]
