@@ -27,9 +27,6 @@ from gibiane_ops.values.modele import ModelZone
 from gibiane_ops.values.nodes import FloatArray, IntArray, node_store
 
 ROUND_OFF = 1e-9
-MISFIT = 1e-6
-"""Largest strain that no displacement of an element has, over the largest strain, that is round-off."""
-
 SIMPLICES = ("TRI3", "TET4")
 
 
@@ -205,8 +202,8 @@ def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side], fields: list[Fiel
 
 def doubts_of(ctx: Context, pieces: Pieces, same: bool, fields: list[Field]) -> str:
     """Say why the simplices are not exactly the elements and their loads; nothing when they are."""
-    if any(field.misfit > MISFIT for field in fields):
-        return "the stress is not that of a displacement in the elements: thermal or other strains are part of it"
+    if any(field.rest is not None and not field.affine.all() for field in fields):
+        return "thermal or other strains, which no displacement of the elements has, are part of the stress"
     points = node_store(ctx).coords[pieces.nodes][:, : pieces.zones[0].dim]
     for zone, cells in zip(pieces.zones, pieces.cells, strict=True):
         of, X = shape(zone.shape), points[cells]

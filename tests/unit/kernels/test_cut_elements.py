@@ -137,10 +137,14 @@ def test_strains_come_back_at_any_point(name, skew):
     guess = np.where(field.affine[:, None, None], xi, 0.9 * xi + 0.1 * of.ref_nodes.mean(axis=0))
     wanted = elasticity.strains(of, points[cells], U[cells], xi)[..., STATIC[of.dim]]
     assert field.strains(np.arange(len(cells)), x, guess) == pytest.approx(wanted, abs=1e-8 * np.abs(wanted).max())
-    # values that are no strains of a displacement are seen, where there are more of them than freedoms
-    noise = np.random.default_rng(5).normal(size=exact.shape)
+    # values that are no strains of a displacement are seen, where there are more of them than freedoms, and kept
+    noisy = exact + np.random.default_rng(5).normal(size=exact.shape)
     more = exact[0].size > points[cells][0].size - 3 * (of.dim - 1)
-    assert (field_of(of, points[cells], exact + noise, one).misfit > 1e-3) == more
+    field = field_of(of, points[cells], noisy, one)
+    assert (field.misfit > 1e-3) == more == (field.rest is not None)
+    x = geometry.positions(of, points[cells], of.gauss[0])
+    again = field.strains(np.arange(len(cells)), x, np.broadcast_to(of.gauss[0], x.shape))
+    assert again == pytest.approx(noisy, abs=1e-8 * np.abs(noisy).max())
 
 
 @pytest.mark.parametrize("skew", [False, True])
@@ -243,3 +247,24 @@ def test_smaller_cells_see_the_same_stress(name, skew):
         N = of.N(fine.source.at.reshape(-1, dim)).reshape(*fine.source.at.shape[:2], -1)
         where = np.einsum("kan,kni->kai", N, points[cells][fine.source.element])
         assert where == pytest.approx(fine.mesh.points[fine.mesh.cells], abs=1e-12)
+
+
+@pytest.mark.parametrize("quadratic", [False, True])
+@pytest.mark.parametrize("finest", [CORNERS, CENTRES, MIDDLES])
+def test_bricks_prisms_and_pyramids_fit(finest, quadratic):
+    points, boxes = grid(3, 1, 1, distortion=0.0)
+    blocks = []
+    for name, box in zip(("CUB8", "PRI6", "PYR5"), boxes, strict=True):
+        points, cells = cut(name, points, box[None])
+        blocks.append((name, cells))
+    if quadratic:
+        second = []
+        for name, cells in blocks:
+            points, more = with_middles(name, points, cells)
+            second.append(({v: k for k, v in LINEAR.items()}[name], more))
+        blocks = second
+    found = Cutting(points, blocks, np.random.default_rng(3).permutation(len(points)), finest)
+    pieces = simplices(found.points, found.cells)
+    assert pieces.volume.sum() == pytest.approx(1.0)
+    X = found.points[pieces.nodes[pieces.boundary]]
+    assert ((np.abs(X) < 1e-9) | (np.abs(X - 1) < 1e-9)).all(axis=1).any(axis=1).all()

@@ -14,12 +14,16 @@ from gibiane_ops.kernels.elements.shape import Shape
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.errors import NotConverged
 from gibiane_ops.kernels.estimate.macro import PAIRS, STATIC
+from gibiane_ops.kernels.supports import extension, through_points
 
 AFFINE = 1e-9
 """Largest change of the jacobian matrix of an element, over its size, for which its map counts as affine."""
 
 INVERSIONS, INVERTED = 50, 1e-12
 """Largest number of Newton steps to a point of an element; distance left that is round-off, over its size."""
+
+FITS = 1e-9
+"""Largest strain that no displacement has, over the largest strain, that is round-off."""
 
 RATIONAL = ("PYR5", "PY13")
 """Elements whose shape functions are not polynomials."""
@@ -42,6 +46,9 @@ class Field:
         Stress from strain, components of `macro.STATIC`.
     misfit : float
         Largest difference to the strains given, over the largest of them: round-off for those of a displacement.
+    rest : (m, q, n_s) float64, optional
+        This difference (of thermal strains), at the points of the stiffness rule; the interpolation that they determine
+        in between, which holds thermal strains interpolated from the nodes of elements of affine map.
     """
 
     of: Shape
@@ -51,6 +58,7 @@ class Field:
     straight: NDArray[np.bool_]
     law: FloatArray
     misfit: float
+    rest: FloatArray | None = None
 
     def strains(self, cells: IntArray, x: FloatArray, guess: FloatArray, alike: IntArray | None = None) -> FloatArray:
         """Evaluate strains at points of elements.
@@ -84,11 +92,9 @@ class Field:
             some = np.flatnonzero(rows)
             if len(some):
                 xi[some] = located(of, self.X[cells[some], : of.n_nodes], x[some], guess[some])
-        number = (
-            np.arange(k)
-            if alike is None
-            else np.where(self.affine[cells], alike, alike.max(initial=0) + 1 + np.arange(k))
-        )
+        number = np.arange(k)
+        if alike is not None:
+            number = np.where(self.affine[cells], alike, alike.max(initial=0) + 1 + number)
         _, first, same = np.unique(number, return_index=True, return_inverse=True)
         slope = self.of.dN(xi[first].reshape(-1, dim)).reshape(len(first), p, -1, dim).swapaxes(1, 2)
         slope = slope.reshape(len(first), -1, p * dim)[same]
@@ -97,7 +103,12 @@ class Field:
         J, H = (found[:, i].swapaxes(1, 2) for i in (0, 1))
         gradient = np.matmul(H, np.linalg.inv(J))
         pairs = PAIRS[dim]
-        return np.stack([gradient[..., i, j] + (gradient[..., j, i] if i != j else 0.0) for i, j in pairs], axis=-1)
+        strain = np.stack([gradient[..., i, j] + (gradient[..., j, i] if i != j else 0.0) for i, j in pairs], axis=-1)
+        if self.rest is None:
+            return strain
+        there = xi[first].reshape(-1, dim)
+        carried = through_points(self.of, there) if self.of.degree > 1 else extension(self.of, self.of.gauss[0], there)
+        return np.asarray(strain + np.matmul(carried.reshape(len(first), p, -1)[same], self.rest[cells]), np.float64)
 
     def stresses_on(self, of: Shape, cells: IntArray, local: IntArray, xi: FloatArray) -> FloatArray:
         """Evaluate stresses at points of facets.
@@ -198,7 +209,7 @@ def field_of(of: Shape, X: FloatArray, stress: FloatArray, compliance: FloatArra
         if middle:
             off = np.abs(X[:, middle[0]] - (X[:, a] + X[:, b]) / 2).max(axis=1)
             straight &= off <= AFFINE * np.abs(X[:, a] - X[:, b]).max(axis=1)
-    U, misfit, largest = np.empty(X.shape), 0.0, float(np.abs(strain).max(initial=0.0))
+    U, rest, largest = np.empty(X.shape), np.empty(strain.shape), float(np.abs(strain).max(initial=0.0))
     turns = [(i, j) for i in range(dim) for j in range(i)]
     for start in range(0, m, elasticity.CHUNK):
         some = slice(start, start + elasticity.CHUNK)
@@ -216,14 +227,8 @@ def field_of(of: Shape, X: FloatArray, stress: FloatArray, compliance: FloatArra
         u = np.linalg.solve(A, np.matmul(B.swapaxes(1, 2), given))
         # one more step, in strains that are left: the normal equations lose half of the digits
         u = u + np.linalg.solve(A, np.matmul(B.swapaxes(1, 2), given - np.matmul(B, u)))
-        misfit = max(misfit, float(np.abs(given - np.matmul(B, u)).max(initial=0.0)))
+        rest[some] = (given - np.matmul(B, u)).reshape(rest[some].shape)
         U[some] = u[..., 0].reshape(-1, n, dim)
-    return Field(
-        of,
-        X,
-        U,
-        affine,
-        straight,
-        np.asarray(np.linalg.inv(compliance), np.float64),
-        misfit / largest if largest else 0.0,
-    )
+    misfit = float(np.abs(rest).max(initial=0.0)) / largest if largest else 0.0
+    law = np.asarray(np.linalg.inv(compliance), np.float64)
+    return Field(of, X, U, affine, straight, law, misfit, rest if misfit > FITS else None)
