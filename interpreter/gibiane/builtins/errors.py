@@ -33,7 +33,8 @@ ERRE = operator(
     "never with Coulomb's: GARANTI and a note tell. INFERIEURE and "
     "SUPERIEURE of 'RDC' 'TABL' bound the energy of the exact solution (dual analysis); the table lacks them where "
     "prescribed displacements or gaps are not zero, strains are thermal, elements distorted, or 'BALA' is 0. Thermal "
-    "strains count as interpolated from the integration points (uniform in TRI3, TET4; linear in TRI6, TE10). The procedure RICHARDSON extrapolates the energies of three meshes.",
+    "strains count as interpolated from the integration points (uniform in TRI3, TET4; linear in TRI6, TE10). "
+    "The procedure RICHARDSON extrapolates the energies of three meshes.",
     example="""
     OPTI ERRE IGNO DIME 2 ELEM QUA4 MODE PLAN DEFO ; ERRE 'this text is shown' ; MESS 'and the script goes on' ;
     S = (DROI 8 (0. 0.) (4. 0.)) TRAN 2 (0. 1.) ;
