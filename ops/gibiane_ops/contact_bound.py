@@ -37,6 +37,9 @@ from gibiane_ops.values.pieces import ROUND_OFF, Pieces, cut_sides, doubts_of, f
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
+WORKING = 1e-5
+"""Part of the largest work of friction that it may lack: solutions obey the law that well."""
+
 FLAT = 1e-6
 """Largest angle between the normals of facets and nodes of a contact surface that counts as plane."""
 
@@ -272,6 +275,12 @@ def _doubts(ctx: Context, state: SolvedContact, law: MChaml, found: ContactTract
     threshold = nodal_property(ctx, values, "SEUI", slave) if state.zone.law == "TRESCA" else None
     if threshold is not None and ((open_by > far) & (threshold > 0)).any():
         doubts.append("Tresca's bound on pairs that are open, where it jumps to zero")
+    elif threshold is not None:
+        bound = threshold * state.pairs.area
+        most = float(bound @ np.linalg.norm(state.relative[:, 1:], axis=1))
+        lacking = most + float((state.force[:, 1:] * state.relative[:, 1:]).sum())
+        if lacking > WORKING * most + CLOSED * state.motion * float(bound.sum()):
+            doubts.append("friction does not oppose the slip: does it count from another state, as with 'HIST'?")
     if not found.admissible:
         doubts.append(_unlawful(found.violation))
     if found.flatness > FLAT:
