@@ -239,14 +239,21 @@ BAS = MINI (TC.'ETAT') ; HAUT = MAXI (TC.'ETAT') ;
 @pytest.mark.parametrize(
     ("threshold", "states", "most"),
     [
-        (5e-4, (1, 2), 1.2),
-        pytest.param(1e-4, (1, 2), 1.2, marks=pytest.mark.slow),
-        pytest.param(2e-3, (1, 2), 1.2, marks=pytest.mark.slow),
+        (5e-4, (1, 2), 1.05),
+        pytest.param(1e-4, (1, 2), 1.05, marks=pytest.mark.slow),
+        pytest.param(2e-3, (1, 2), 1.05, marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_threshold_of_tresca(threshold, states, most):
     # Sliding here and there, nearly everywhere, nearly nowhere, and nowhere.
     assert_bounded(TRESCA, threshold, states, most)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("threshold", "states"), [(1e-4, (1, 2)), (5e-4, (1, 2)), (2e-3, (1, 2))])
+def test_threshold_of_tresca_against_a_fine_mesh(threshold, states):
+    # measured 1.010, 1.011, 1.021; the fine mesh leaves about 0.005 of it
+    assert_bounded(TRESCA.replace("BLOCS 24", "BLOCS 96"), threshold, states, 1.03)
 
 
 # Energy of the tied blocks, extrapolated from 6, 12, 24, 48 and 96 triangles a side (its error falls by 2.8 each time).
@@ -276,8 +283,11 @@ def assert_bounded(script, threshold, states, most):
     found = session.names()
     assert found["SURE"], out.getvalue()
     assert (found["BAS"], found["HAUT"]) == states
-    # |u - u_h|^2 = |u_f - u_h|^2 + |u - u_f|^2, and the last one is not below (EF / most)^2.
-    assert 1 <= found["EC"] / np.sqrt(found["EN"] + (found["EF"] / most) ** 2) <= most
+    # The squared error is nearly EN, to a finer solution, and the squared error of that one, between (EF / most)^2 and
+    # EF^2: with friction the two are not orthogonal (EN of 6 and 96 triangles a side is 4 % less than those of 6 and
+    # 24, 24 and 96 together).
+    assert found["EC"] >= np.sqrt(found["EN"])
+    assert found["EC"] / np.sqrt(found["EN"] + (found["EF"] / most) ** 2) <= most
 
 
 def touching(target):
@@ -368,4 +378,4 @@ TC = BLOCS 2 ; TF = BLOCS 4 ;
 @pytest.mark.parametrize(("threshold", "states"), [(1e-4, (1, 2)), (5e-4, (1, 2)), (2e-3, (1, 2)), (1.0, (1, 1))])
 def test_threshold_of_tresca_in_space(threshold, states):
     # A quarter of two cubes, the upper one soft: it spreads, and slips turn about the middle.
-    assert_bounded(SOLIDS + TRESCA[TRESCA.index("L = MOTS") :], threshold, states, 1.25)
+    assert_bounded(SOLIDS + TRESCA[TRESCA.index("L = MOTS") :], threshold, states, 1.2)
