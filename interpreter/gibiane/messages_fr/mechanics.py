@@ -218,6 +218,8 @@ MECHANICS = {
     "ERREUR with 'SPR' estimates the error there, without a bound": "ERREUR avec 'SPR' y estime l'erreur, sans la majorer",
     "the stress does not balance the loads given: {count} nodes keep a force, first node {node} at ({where}), force ({force})": "la contrainte n'équilibre pas le chargement donné : il reste une force à {count} noeuds, le premier {node} en ({where}), force ({force})",
     "give every load by 'PRES', 'FSUR' or 'VOLU' and the supports; forces and supports at single points or lines, and contact, are not balanced by tractions": "donner tout le chargement par 'PRES', 'FSUR' ou 'VOLU' et les appuis ; forces et appuis ponctuels ou linéiques, ainsi que le contact, ne s'équilibrent pas par des vecteurs contrainte",
+    "the loads and contact forces given do not balance a body: {share} of the largest force is left": "le chargement et les forces de contact donnés n'équilibrent pas un corps : il reste {share} de la plus grande force",
+    "give every load by 'PRES', 'FSUR' or 'VOLU' and the supports, and the contact forces (REAC) of this very solution": "donner tout le chargement par 'PRES', 'FSUR' ou 'VOLU' et les appuis, et les forces de contact (REAC) de cette solution même",
     "an equilibrated stress is not built on small elements beside a large one (hanging nodes)": "une contrainte en équilibre ne se construit pas sur de petits éléments à côté d'un grand (noeuds pendants)",
     "'RESI' takes them; TRI3 and TET4 divided in place have none": "'RESI' les prend ; les TRI3 et TET4 divisés sur place n'en ont pas",
     "explicit residuals are made on solids, not on bars": "les résidus explicites se calculent sur des solides, non sur des barres",

@@ -17,6 +17,7 @@ from gibiane_ops.kernels.contact.node_facet import are_inside, node_facet_pairs
 from gibiane_ops.kernels.contact.node_pairs import node_pairs, with_surface
 from gibiane_ops.kernels.contact.obstacle import obstacle_pairs
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.kernels.contact.sharing import forces_by_zone
 from gibiane_ops.values.champs import ChamZone, ChPoint, MChaml
 from gibiane_ops.values.conditions import family
 from gibiane_ops.values.failures import worded
@@ -262,12 +263,14 @@ def solved_contacts(
     found, kind, store = [], family(ctx), node_store(ctx)
     if not model.contacts:
         ctx.fail(26, "this model has no contact zone", at="mc", hint="MODE G1 G2 'CONTACT' ... makes one")
+    every = []
     for zone in model.contacts:
         pairs = carried(zone_pairs(ctx, zone, "mc"), reaction.nodes)
         # forces of a node on a sharp edge are known together: it counts for the side that comes first
         first = np.unique(pairs.pairs[:, 0], return_index=True)[1]
-        if len(first) < len(pairs.pairs):
-            pairs = pairs.only(np.sort(first))
+        every.append(pairs.only(np.sort(first)) if len(first) < len(pairs.pairs) else pairs)
+    forces = forces_by_zone(every, lambda nodes: reaction.table(FORCES[kind], nodes))
+    for zone, pairs, force in zip(model.contacts, every, forces, strict=True):
         frames, _, _ = local_frames(pairs.normals, np.ones(pairs.normals.shape, bool))
         values = material.zone_of(zone) if material is not None else None
         slave = pairs.pairs[:, 0]
@@ -275,7 +278,6 @@ def solved_contacts(
         mu = nodal_property(ctx, values, "MU", slave) if zone.law != "UNILATERAL" else None
         nodes, rows = _columns(pairs.matrix(store.count))
         relative = rows @ u.table(DISPLACEMENTS[kind], nodes)
-        force = reaction.table(FORCES[kind], slave)
         vectors = force, relative, pairs.forces_on_pairs(force), pairs.at_nodes(relative)
         local_force, pair_relative, pair_force, at_nodes = (np.einsum("nij,nj->ni", frames, v) for v in vectors)
         found.append(

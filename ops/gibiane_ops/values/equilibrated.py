@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gibiane.registry import Context
-from gibiane_ops.kernels.errors import NotEquilibrated
+from gibiane_ops.kernels.errors import NotConverged, NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
 from gibiane_ops.kernels.estimate.bodies import without_resultants
 from gibiane_ops.kernels.estimate.fields import Field
@@ -131,8 +131,18 @@ def equilibrated(
         if aim is not None:
             known, there = held_directions(node_store(ctx), supports, DISPLACEMENTS[zones[0].family], dim)
             held = _held(pieces, mesh, free, held_at(known, there, pieces.nodes))
-            with worded(ctx, at="sig"):
-                sigma = balanced_stress(mesh, sigma, law, loads, held)
+            try:
+                with worded(ctx, at="sig"):
+                    sigma = balanced_stress(mesh, sigma, law, loads, held)
+            except NotConverged as failure:
+                ctx.fail(
+                    21,
+                    "the loads and contact forces given do not balance a body: {share} of the largest force is left",
+                    at="sig",
+                    share=f"{100 * failure.history[-1]:.2g} %",
+                    hint="give every load by 'PRES', 'FSUR' or 'VOLU' and the supports, and the contact forces (REAC) "
+                    "of this very solution",
+                )
         try:
             return admissible_stress(
                 points, cells, sigma, law, loads, sweeps=count, mesh=mesh, aim=aim, source=source, joint=joint
