@@ -94,9 +94,9 @@ def improve(target: Target, tau: FloatArray, cells: IntArray) -> None:
     Notes
     -----
     The equilibrated stresses of a mesh are those of stress functions, an unknown of fourth order: corrections that
-    travel from star to star need some (size / h)^4 sweeps (a plate with a hole: 1.79 times the error after 40 sweeps
-    of 576 triangles, 1.19 here; a block with a crack: 1.42 after ten sweeps of 384 tetrahedra, 1.16 here), while one
-    sparse factor costs less than a sweep of some thousand tetrahedra. The rigid balances of the cells are constraints,
+    travel from star to star need some (size / h)^4 sweeps (a plate with a hole: 1.5 times the least estimate after 40
+    sweeps of 576 triangles, a block with a crack: 1.22 times after ten of 384 tetrahedra), while one sparse factor
+    costs less than a sweep of some thousand tetrahedra. The rigid balances of the cells are constraints,
     by an augmented Lagrangian. Tractions that leave the law of contact are pushed back by stiff springs, as long as
     they push (semi-smooth Newton); where friction is at its bound g the multiplier p of ``|R_t| <= g`` also resists
     turning, with p / g. What they leave is cut from the change.
