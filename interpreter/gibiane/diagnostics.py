@@ -85,6 +85,17 @@ class Text:
         return _AN.sub("an ", text) if lang == "en" else text
 
 
+def joined(texts: Sequence[Text], separator: str) -> Text | None:
+    """Put sentences one after the other, each once; None when there is none."""
+    unlike = list({text.render(): text for text in texts}.values())
+    names = [f"t{i}" for i in range(len(unlike))]
+    return (
+        Text(separator.join("{" + name + "}" for name in names), dict(zip(names, unlike, strict=True)))
+        if unlike
+        else None
+    )
+
+
 @dataclass(frozen=True)
 class Label:
     """What one operand is, said under its carets."""

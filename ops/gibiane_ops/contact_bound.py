@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gibiane.diagnostics import Text
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
@@ -24,7 +25,7 @@ from gibiane_ops.values.contact_estimates import (
     shared_out,
 )
 from gibiane_ops.values.contact_surface import CLOSED, Surface, lost, surface_of
-from gibiane_ops.values.equilibrated import check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
+from gibiane_ops.values.equilibrated import COULOMB, check_balance, energy_bounds, equilibrated, guarantee_of, parts_of
 from gibiane_ops.values.estimates import NORM, REFE, TABL, stresses_of
 from gibiane_ops.values.exterior import LOADS, Side, add_tractions, exterior
 from gibiane_ops.values.failures import worded
@@ -110,7 +111,7 @@ def _bound_with_contact(
     blocks = [(z.shape, z.cells) for z in zones]
     totals = [np.zeros(len(cells)) for _, cells in blocks]
     facets: list[ChamZone] = []
-    doubts: list[str] = []
+    doubts: list[Text] = []
     squares: list[list[FloatArray]] = []
     nodal = True
     surfaces = [surface_of(ctx, state, given.law, pieces, cl) for state in states]
@@ -120,7 +121,7 @@ def _bound_with_contact(
         squares.append(each)
         doubts += _doubts(ctx, state, given.law, found)
         if surface.quadratic and surface.opens_in_part(found.traction):
-            doubts.append("quadratic contact facets are open in part, and may overlap between their nodes")
+            doubts.append(Text("quadratic contact facets are open in part, and may overlap between their nodes"))
     joint, parts = _joint(states, surfaces, pieces, sides[0], squares)
     solid = equilibrated(ctx, pieces, stress, material, fields, boundary, volu, sweeps, cl, joint, nodal)
     for (square, owner), change in zip(parts, np.split(solid.contact, _ends(parts)), strict=bool(len(solid.contact))):
@@ -132,9 +133,7 @@ def _bound_with_contact(
         facets += facet_zones(ctx, state, each, zones[0].mode)
     if solid.excess > VIOLATION:
         doubts.append(_unlawful(solid.excess))
-    cutting = doubts_of(ctx, pieces, boundary.same, fields)
-    doubts += [cutting] if cutting else []
-    guarantee = guarantee_of(ctx, solid, "; ".join(dict.fromkeys(doubts)), "Coulomb" in doubts)
+    guarantee = guarantee_of(ctx, solid, doubts + doubts_of(ctx, pieces, boundary.same, fields))
     more: dict[str, Any] = {"EQUILIBRE": solid.residual, "HISTOIRE": ListReel(solid.history)}
     if all(state.zone.law == "UNILATERAL" and _without_gap(state) for state in states):
         more |= energy_bounds(solid, float(sum(each.sum() for each in totals)))
@@ -253,38 +252,39 @@ def _without_gap(state: SolvedContact) -> bool:
     return bool(np.abs(state.gap).max(initial=0.0) <= CLOSED * np.abs(state.relative).max(initial=0.0))
 
 
-def _unlawful(violation: float) -> str:
-    return f"no contact tractions in balance obey the law: it is left by {violation:.2g}"
+def _unlawful(violation: float) -> Text:
+    return Text("no contact tractions in balance obey the law: it is left by {size}", {"size": f"{violation:.2g}"})
 
 
-def _doubts(ctx: Context, state: SolvedContact, law: MChaml, found: ContactTractions) -> list[str]:
+def _doubts(ctx: Context, state: SolvedContact, law: MChaml, found: ContactTractions) -> list[Text]:
     """Say what keeps the contact of a zone from being part of a bound."""
-    doubts = []
+    doubts: list[Text] = []
     slave, values = state.pairs.pairs[:, 0], law.zone_of(state.zone)
     size = float(np.abs(state.force).max(initial=0.0))
     convex = state.zone.law in ("UNILATERAL", "TRESCA")
     if not convex and ((state.mu > 0).any() or np.abs(state.force[:, 1:]).max(initial=0.0) > CLOSED * size):
-        doubts.append("Coulomb" if state.zone.law == "COULOMB" else f"friction law {state.zone.law}")
+        law_name = state.zone.law
+        doubts.append(COULOMB if law_name == "COULOMB" else Text("friction law {law}", {"law": law_name}))
     adhesion = nodal_property(ctx, values, "ADHE", slave)
     if adhesion is not None and (adhesion > 0).any():
-        doubts.append("adhesion")
+        doubts.append(Text("adhesion"))
     open_by = state.gap - state.relative[:, 0]
     far = CLOSED * float(np.abs(state.relative).max(initial=0.0))
     if (-open_by).max(initial=0.0) > max(far, CLOSED * float(np.abs(state.gap).max(initial=0.0))):
-        doubts.append(f"the bodies overlap by {-open_by.min():.2g}")
+        doubts.append(Text("the bodies overlap by {depth}", {"depth": f"{-open_by.min():.2g}"}))
     threshold = nodal_property(ctx, values, "SEUI", slave) if state.zone.law == "TRESCA" else None
     if threshold is not None and ((open_by > far) & (threshold > 0)).any():
-        doubts.append("Tresca's bound on pairs that are open, where it jumps to zero")
+        doubts.append(Text("Tresca's bound on pairs that are open, where it jumps to zero"))
     elif threshold is not None:
         bound = threshold * state.pairs.area
         most = float(bound @ np.linalg.norm(state.relative[:, 1:], axis=1))
         lacking = most + float((state.force[:, 1:] * state.relative[:, 1:]).sum())
         if lacking > WORKING * most + CLOSED * state.motion * float(bound.sum()):
-            doubts.append("friction does not oppose the slip: does it count from another state, as with 'HIST'?")
+            doubts.append(Text("friction does not oppose the slip: does it count from another state, as with 'HIST'?"))
     if not found.admissible:
         doubts.append(_unlawful(found.violation))
     if found.flatness > FLAT:
-        doubts.append("the contact surface is not plane")
+        doubts.append(Text("the contact surface is not plane"))
     if len(state.pairs.unpaired_slave):
-        doubts.append("nodes of the contact surface have no partner")
+        doubts.append(Text("nodes of the contact surface have no partner"))
     return doubts

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from gibiane.diagnostics import Text
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL
@@ -32,7 +33,7 @@ from gibiane_ops.values.pieces import cut_sides, doubts_of, fields_of, pieces_of
 from gibiane_ops.values.rigidite import Rigidite
 
 ERRE = extend("ERREUR")
-RESIDUALS = Guarantee(False, "explicit residuals follow the error up to a factor that depends on the mesh")
+RESIDUALS = Guarantee(False, Text("explicit residuals follow the error up to a factor that depends on the mesh"))
 
 
 @ERRE.form(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gibiane.diagnostics import Text
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, extend
 from gibiane.values import FLOTTANT, MCHAML, MMODEL, MOT, Table
@@ -24,7 +25,7 @@ from gibiane_ops.values.modele import Modele, ModelZone
 from gibiane_ops.values.nodes import FloatArray, node_store
 
 ERRE = extend("ERREUR")
-EXACT = Guarantee(True, "the true error, up to the integration of the exact stress")
+EXACT = Guarantee(True, Text("the true error, up to the integration of the exact stress"))
 COMMON = (
     Key("EXAC", "true error", required=True),
     Arg("model", MMODEL, "model"),

@@ -3,6 +3,7 @@
 A sentence that no module holds any more is removed, a new one added: tests/unit/gibiane/test_messages.py names both.
 """
 
+from gibiane.messages_fr.estimation import ESTIMATION
 from gibiane.messages_fr.geometry import GEOMETRY
 from gibiane.messages_fr.language import LANGUAGE
 from gibiane.messages_fr.lists import LISTS
@@ -17,6 +18,7 @@ FRENCH: dict[str, str] = {
     **LISTS,
     **MESH,
     **MECHANICS,
+    **ESTIMATION,
     **NUMBERS,
     **PICTURES,
     **SOLUTIONS,

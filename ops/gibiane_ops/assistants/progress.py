@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Sequence
 
+from gibiane.diagnostics import Text
 from gibiane.registry import Context
 from gibiane_ops.assistants.forecast import Forecast
 
@@ -43,9 +44,10 @@ class Progress:
         self.missing = list(missing)
         self.count = self.old = self.total - len(missing)
         if self.old:
-            self._tell(f" ASSI : {self.old} of {self.total} cases were done before")
+            self._tell(Text("{old} of {total} cases were done before", {"old": self.old, "total": self.total}))
         if self.forecast is not None and missing:
-            self._tell(f" ASSI : {len(missing)} cases to do, about {span(self.left())} on {self.workers} process(es)")
+            fields = {"count": len(missing), "time": span(self.left()), "workers": self.workers}
+            self._tell(Text("{count} cases to do, about {time} on {workers} process(es)", fields))
 
     def left(self) -> float:
         """Return the seconds ahead: what was expected, corrected by what the finished cases took."""
@@ -69,10 +71,16 @@ class Progress:
         if self.slow and now - self.last < EVERY and self.count < self.total:
             return
         self.last = now
-        elapsed, left = span(now - self.start), span(self.left())
-        self._tell(f" ASSI : {self.count} of {self.total} cases, {elapsed}, about {left} left")
+        times = {"elapsed": span(now - self.start), "left": span(self.left())}
+        self._tell(
+            Text(
+                "{done} of {total} cases, {elapsed}, about {left} left",
+                {"done": self.count, "total": self.total} | times,
+            )
+        )
 
-    def _tell(self, line: str) -> None:
+    def _tell(self, sentence: Text) -> None:
+        line = f" ASSI : {sentence.render(self.ctx.session.lang)}"
         if self.listed:
             self.ctx.write(line)
         elif self.terminal:

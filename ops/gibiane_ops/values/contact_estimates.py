@@ -124,7 +124,7 @@ def contact_results(
     if not tabl:
         without_table(ctx, reference)
         return found.solid, found.contact, found.total, field
-    table = table_of(found, parts, field, norm, guarantee)
+    table = table_of(ctx, found, parts, field, norm, guarantee)
     table.set("FACETTE", MChaml(facets, SCALAIRE, "GRAVITE", "error"))
     for index, value in (more or {}).items():
         table.set(index, value)

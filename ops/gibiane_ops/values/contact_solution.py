@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gibiane.diagnostics import Text
+from gibiane.diagnostics import Text, joined
 from gibiane.registry import Context
 from gibiane.values import Table
 from gibiane_ops.kernels import errors as k_errors
@@ -25,7 +25,7 @@ from gibiane_ops.values.contact_checks import check_normals, held_rows, overlapp
 from gibiane_ops.values.contact_condition import condition
 from gibiane_ops.values.contact_run import Prepared, run_on_bodies, serves, way_of
 from gibiane_ops.values.contact_start import force_nodes, slip_origin_of, start_of
-from gibiane_ops.values.contact_words import counted, departures, fail_contact, listed, reason_of, stopped, success
+from gibiane_ops.values.contact_words import counted, departures, fail_contact, reason_of, stopped, success
 from gibiane_ops.values.failures import worded
 from gibiane_ops.values.linear import solver_wish
 from gibiane_ops.values.methods import Method
@@ -245,7 +245,7 @@ def _run(
                 "{others}, with forces that differ by {share} of the largest",
                 at="k",
                 here=counted(state),
-                others=listed([counted(other) for other in others.others], " / "),
+                others=joined([counted(other) for other in others.others], " / "),
                 share=f"{others.difference:.2g}",
                 hint="large friction coefficients allow several equilibria; the one returned is that of the method",
             )

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NoReturn
 
 import numpy as np
 
-from gibiane.diagnostics import Text
+from gibiane.diagnostics import Text, joined
 from gibiane.registry import Context
 from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.report import ContactState
@@ -47,7 +46,7 @@ def departures(state: ContactState) -> Text:
         (outside, Text("force outside the cone {value}", {"value": f"{outside:.2g}"})),
         (power, Text("power {value}", {"value": f"{power:.2g}"})),
     ]
-    return listed([text for value, text in parts if value > 1e-3 * report.worst], ", ") or Text("none")
+    return joined([text for value, text in parts if value > 1e-3 * report.worst], ", ") or Text("none")
 
 
 def counted(state: ContactState) -> Text:
@@ -56,17 +55,6 @@ def counted(state: ContactState) -> Text:
     return Text(
         "{open} open, {stick} stick, {slip} slip",
         {"open": report.n_open, "stick": report.n_stick, "slip": report.n_slip},
-    )
-
-
-def listed(texts: Sequence[Text], separator: str) -> Text | None:
-    """Put sentences one after the other, each once; None when there is none."""
-    unlike = list({text.render(): text for text in texts}.values())
-    names = [f"t{i}" for i in range(len(unlike))]
-    return (
-        Text(separator.join("{" + name + "}" for name in names), dict(zip(names, unlike, strict=True)))
-        if unlike
-        else None
     )
 
 

@@ -8,6 +8,7 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from gibiane.diagnostics import Text, joined
 from gibiane.registry import Context
 from gibiane_ops.kernels.errors import NotConverged, NotEquilibrated
 from gibiane_ops.kernels.estimate.admissible import SWEEPS, Admissible, admissible_stress, plane_compliance
@@ -35,19 +36,17 @@ from gibiane_ops.values.rigidite import Rigidite
 WORKLESS = 1e-7
 """Work of prescribed displacements over the energy that is none: solutions are as exact as that."""
 
-GUARANTEED = Guarantee(True, "a stress in exact equilibrium with the loads: the error is not above this value")
-
-INTEGRATED = (
-    "a stress in exact equilibrium with the loads: the error is not above this value, of which {share} stands for the "
-    "integration of rational stresses (the difference of two rules)"
-)
+GUARANTEED = Guarantee(True, Text("a stress in exact equilibrium with the loads: the error is not above this value"))
+COULOMB = Text("Coulomb")
+"""Doubt that a problem near by has not."""
 
 
-def guarantee_of(ctx: Context, found: Admissible, doubt: str = "", coulomb: bool = False) -> Guarantee:
-    """Say whether the equilibrium was found to hold to round-off, and nothing else is in `doubt`; if not, warn."""
-    if doubt:
-        reason = f"not guaranteed ({doubt})"
-        if coulomb:
+def guarantee_of(ctx: Context, found: Admissible, doubts: Sequence[Text]) -> Guarantee:
+    """Say whether the equilibrium was found to hold to round-off, and there are no other `doubts`; if not, warn."""
+    doubt = joined(doubts, "; ")
+    if doubt is not None:
+        reason = Text("not guaranteed ({doubt})", {"doubt": doubt})
+        if COULOMB in doubts:
             ctx.warn(
                 "G411",
                 "the estimate is not a bound: {reason}",
@@ -62,14 +61,22 @@ def guarantee_of(ctx: Context, found: Admissible, doubt: str = "", coulomb: bool
         if not found.remainder:
             return GUARANTEED
         share = 1.0 - np.sqrt(1.0 - found.remainder / found.total**2)
-        return Guarantee(True, INTEGRATED.format(share=f"{share:.1e}"))
+        return Guarantee(
+            True,
+            Text(
+                "a stress in exact equilibrium with the loads: the error is not above this value, of which {share} "
+                "stands for the integration of rational stresses (the difference of two rules)",
+                {"share": f"{share:.1e}"},
+            ),
+        )
+    left = f"{found.residual:.1e}"
     ctx.warn(
         "G411",
         "the equilibrium of the stress is violated by {share} of its tractions: the estimate is not a bound",
         level=1,
-        share=f"{found.residual:.1e}",
+        share=left,
     )
-    return Guarantee(False, f"the equilibrium is violated by {found.residual:.1e} of the tractions")
+    return Guarantee(False, Text("the equilibrium is violated by {share} of the tractions", {"share": left}))
 
 
 def parts_of(pieces: Pieces, found: Admissible) -> Parts:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gibiane.diagnostics import Text
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context
 from gibiane.values import FLOTTANT, MCHAML, Table
@@ -37,8 +38,10 @@ REFE = Key(
 
 
 READING = {
-    "USUE": "relative to the energy norm of the solution and of its error",
-    "THES": "relative to the norm of smoothed plus computed stress, as in the thesis: about half of the usual figure",
+    "USUE": Text("relative to the energy norm of the solution and of its error"),
+    "THES": Text(
+        "relative to the norm of smoothed plus computed stress, as in the thesis: about half of the usual figure"
+    ),
 }
 
 
@@ -46,10 +49,10 @@ class Guarantee(NamedTuple):
     """Whether an estimate bounds the error from above, and why."""
 
     holds: bool
-    reason: str
+    reason: Text
 
 
-SMOOTHED = Guarantee(False, "a smoothed stress estimates the error; only an equilibrated stress bounds it")
+SMOOTHED = Guarantee(False, Text("a smoothed stress estimates the error; only an equilibrated stress bounds it"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +102,7 @@ def results(
     if not tabl:
         without_table(ctx, reference)
         return (found.total, field, found.absolute) if wanted_results(ctx) > 2 else (found.total, field)
-    table = table_of(found, parts, field, norm, guarantee)
+    table = table_of(ctx, found, parts, field, norm, guarantee)
     for index, value in (more or {}).items():
         table.set(index, value)
     add_quality(ctx, table, parts, found, [e.error for e in parts.errors], reference)
@@ -142,8 +145,11 @@ def add_quality(
     table.set("THETA", found.absolute / float(np.sqrt(left)))
 
 
-def table_of(found: RelativeError, parts: Parts, field: MChaml, norm: str | None, guarantee: Guarantee) -> Table:
-    """Return the TABLE of an estimate."""
+def table_of(
+    ctx: Context, found: RelativeError, parts: Parts, field: MChaml, norm: str | None, guarantee: Guarantee
+) -> Table:
+    """Return the TABLE of an estimate, its sentences in the language of the session."""
+    lang = ctx.session.lang
     table = Table()
     for index, value in {
         "GLOBALE": found.total,
@@ -153,10 +159,10 @@ def table_of(found: RelativeError, parts: Parts, field: MChaml, norm: str | None
         "ENERGIE": found.energy,
         "NBEL": sum(z.mesh.n_cells for z in parts.zones),
         "NORME": (norm or "USUEL")[:4],
-        "LECTURE": READING[(norm or "USUEL")[:4]],
+        "LECTURE": READING[(norm or "USUEL")[:4]].render(lang),
         "CARTE": field,
         "GARANTI": guarantee.holds,
-        "RAISON": guarantee.reason,
+        "RAISON": guarantee.reason.render(lang),
     }.items():
         table.set(index, value)
     return table

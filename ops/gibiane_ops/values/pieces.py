@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from gibiane.diagnostics import Text
 from gibiane.registry import Context
 from gibiane_ops.kernels import topology
 from gibiane_ops.kernels.elements.shape import Shape
@@ -200,23 +201,25 @@ def cut_sides(ctx: Context, pieces: Pieces, sides: list[Side], fields: list[Fiel
     return Boundary(Side(Facets(name, nodes, cell, np.zeros(len(nodes), np.int64)), values, free), same, chords)
 
 
-def doubts_of(ctx: Context, pieces: Pieces, same: bool, fields: list[Field]) -> str:
+def doubts_of(ctx: Context, pieces: Pieces, same: bool, fields: list[Field]) -> list[Text]:
     """Say why the simplices are not exactly the elements and their loads; nothing when they are."""
     if any(field.rest is not None and not field.affine.all() for field in fields):
-        return "thermal or other strains, which no displacement of the elements has, are part of the stress"
+        return [Text("thermal or other strains, which no displacement of the elements has, are part of the stress")]
     points = node_store(ctx).coords[pieces.nodes][:, : pieces.zones[0].dim]
     for zone, cells in zip(pieces.zones, pieces.cells, strict=True):
         of, X = shape(zone.shape), points[cells]
         size = np.abs(X - X[:, :1]).max(axis=(1, 2))
         for a, b, *middle in of.edges:
             if middle and _off_chord(X[:, a], X[:, b], X[:, middle[0]], size):
-                return "sides of elements are curved: the stress in equilibrium stands on their chords"
+                return [Text("sides of elements are curved: the stress in equilibrium stands on their chords")]
         for kind, corners in of.faces:
             if shape(kind).n_corners == 4 and not _plane(X[:, list(corners[:4])], size):
-                return "faces of elements are not plane: those of the stress in equilibrium are cut into triangles"
+                return [
+                    Text("faces of elements are not plane: those of the stress in equilibrium are cut into triangles")
+                ]
     if not same:
-        return "a load varies more than linearly over the facets of the stress in equilibrium"
-    return ""
+        return [Text("a load varies more than linearly over the facets of the stress in equilibrium")]
+    return []
 
 
 def _off_chord(a: FloatArray, b: FloatArray, middle: FloatArray, size: FloatArray) -> bool:

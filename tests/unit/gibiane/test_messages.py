@@ -24,29 +24,46 @@ SENTENCE_AT = {
     "Incompatible": 1,
     "Text": 0,
     "BadFormat": 0,
+    "Guarantee": 1,
 }
 SENTENCE_KEYWORDS = ("hint", "label", "template")
-PLAIN_CALLS = {"Incompatible", "make", "error", "fail", "warn", "diagnostic", "report", "Text", "Label", "BadFormat"}
+PLAIN_CALLS = {
+    "Incompatible",
+    "make",
+    "error",
+    "fail",
+    "warn",
+    "diagnostic",
+    "report",
+    "Text",
+    "Label",
+    "BadFormat",
+    "Guarantee",
+}
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """Return the sources that can hold sentences, by their paths."""
+    paths = [path for folder in SOURCES for path in sorted(folder.rglob("*.py")) if "kernels" not in path.parts]
+    return {str(path.relative_to(ROOT)): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
 
 
 @cache
 def sentences() -> dict[str, str]:
     """Return every template of the sources with the place where it stands."""
     found: dict[str, str] = {}
-    for folder in SOURCES:
-        for path in sorted(folder.rglob("*.py")):
-            if "kernels" in path.parts:
-                continue
-            tree = ast.parse(path.read_text(encoding="utf-8"))
-            for template, line in _templates(tree):
-                found.setdefault(template, f"{path.relative_to(ROOT)}:{line}")
+    for path, tree in trees().items():
+        for template, line in _templates(tree):
+            found.setdefault(template, f"{path}:{line}")
     return found
 
 
 def _templates(tree: ast.Module) -> Iterator[tuple[str, int]]:
     scopes = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]
+    everywhere = _assigned(tree)
     for scope in [*scopes, tree]:
-        assigned = _assigned(scope)
+        assigned = {**everywhere, **_assigned(scope)}
         for node in _own_nodes(scope):
             if isinstance(node, ast.Call):
                 for argument in _sentence_arguments(node):
@@ -119,6 +136,21 @@ def test_the_scan_finds_sentences() -> None:
     assert len(found) > 150
     assert "division by zero" in found
     assert "no result is left for {name}" in found
+
+
+def test_reasons_of_estimates_and_lines_of_studies_are_sentences() -> None:
+    assert "adhesion" in sentences()
+    assert "not guaranteed ({doubt})" in sentences()
+    assert "explicit residuals follow the error up to a factor that depends on the mesh" in sentences()
+    assert "{old} of {total} cases were done before" in sentences()
+
+
+def test_no_sentence_is_filled_before_it_is_translated() -> None:
+    calls = ((path, n) for path, tree in trees().items() for n in ast.walk(tree) if isinstance(n, ast.Call))
+    filled = [
+        f"{path}:{n.lineno}" for path, n in calls if any(isinstance(a, ast.JoinedStr) for a in _sentence_arguments(n))
+    ]
+    assert filled == []
 
 
 def test_every_sentence_has_a_french_one() -> None:
