@@ -27,7 +27,7 @@ ESTIMATION: dict[str, str] = {
     "faces of elements are not plane: those of the stress in equilibrium are cut into triangles": "des faces d'éléments ne sont pas planes : celles de la contrainte en équilibre sont coupées en triangles",
     "a load varies more than linearly over the facets of the stress in equilibrium": "une charge varie plus que linéairement sur les facettes de la contrainte en équilibre",
     # studies of ASSI
-    "{old} of {total} cases were done before": "{old} cas sur {total} étaient déjà faits",
+    "{old} of {total} cases were done before": "{old} cas sur {total} déjà faits",
     "{count} cases to do, about {time} on {workers} process(es)": "{count} cas à faire, environ {time} sur {workers} processus",
     "{done} of {total} cases, {elapsed}, about {left} left": "{done} cas sur {total}, {elapsed}, encore {left} environ",
 }

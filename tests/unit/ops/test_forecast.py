@@ -54,9 +54,9 @@ def test_the_rest_is_foretold_when_the_longest_quarter_of_the_time_is_over(power
 class Context:
     """What Progress asks of the place that it runs in."""
 
-    def __init__(self):
+    def __init__(self, lang="en"):
         self.lines = []
-        self.session = SimpleNamespace(err=io.StringIO())
+        self.session = SimpleNamespace(err=io.StringIO(), lang=lang)
 
     def option(self, name):
         return 1
@@ -83,6 +83,16 @@ def test_cases_kept_from_before_are_not_counted_as_measured():
     progress.begin([2, 3])
     assert progress.ctx.lines[0] == " ASSI : 2 of 4 cases were done before"
     assert progress.left() == pytest.approx(2.0)
+
+
+def test_the_lines_speak_the_language_of_the_session():
+    progress = Progress(Context("fr"), 3, [8.0, 4.0, 2.0], 0)
+    progress.begin([1, 2])
+    progress.done(1, 0.0)
+    before, ahead, now = progress.ctx.lines
+    assert before == " ASSI : 1 cas sur 3 déjà faits"
+    assert ahead == " ASSI : 2 cas à faire, environ 6 s sur 1 processus"
+    assert now == " ASSI : 2 cas sur 3, 0 s, encore 2 s environ"
 
 
 def test_lengths_of_time_are_written_as_one_says_them():
