@@ -45,6 +45,15 @@ def rows(scene: str, n: int) -> dict[tuple[str, str, int], dict]:
     return found
 
 
+def test_coarse_meshes():
+    for (name, element, n), row in rows("plans", 1).items():
+        assert row["guaranteed"] == (element in ELEMENTS or name in SINGULAR)
+        assert (1 if row["guaranteed"] else 0.97) <= row["theta"]["RDC"] <= 1.2, (name, element, n)
+        if element in ELEMENTS and name in SMOOTH:
+            assert 0.75 <= row["theta"]["SPR"] <= 1.2, (name, element)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_uniform_refinement_shows_the_regularity(element):
     for name in (*SMOOTH, *SINGULAR):
@@ -54,6 +63,7 @@ def test_uniform_refinement_shows_the_regularity(element):
         assert rate == pytest.approx(wanted, abs=0.15 if name == "hole" else 0.05), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_patches_are_good_on_smooth_problems(element):
     for name in SMOOTH:
@@ -66,6 +76,7 @@ def test_patches_are_good_on_smooth_problems(element):
             assert fine["SD"][method] < coarse["SD"][method], (name, method)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_estimates_follow_a_singular_error(element):
     # neither asymptotically exact nor worse with the size: theta stays what it is
@@ -76,6 +87,7 @@ def test_estimates_follow_a_singular_error(element):
             assert fine["theta"][method] > 0.55, (name, method)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ELEMENTS)
 def test_equilibrated_stresses_bound_every_error(element):
     for (name, of, n), row in table().items():
@@ -87,6 +99,7 @@ def test_equilibrated_stresses_bound_every_error(element):
         assert 1 <= row["theta"]["RDC"] <= 1.05, (name, n)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("element", QUADRATIC)
 def test_quadratic_elements_want_patches(element):
     for name in ("tube", "hole", *SINGULAR):

@@ -45,6 +45,29 @@ def rigid_modes(points: FloatArray, centre: FloatArray | None = None) -> FloatAr
     return modes.reshape(n * dim, -1)
 
 
+def unseen(A: FloatArray, limit: float) -> FloatArray:
+    """Find the combinations of a few columns that many rows do not see.
+
+    Parameters
+    ----------
+    A : (n, k) float64
+    limit : float
+        Singular values up to this one are none.
+
+    Returns
+    -------
+    (q, k) float64
+        Orthonormal rows.
+
+    Cost
+    ----
+    n k^2, without a matrix of n by n.
+    """
+    # rows of zeros, so that there are as many singular values as columns
+    _, values, right = np.linalg.svd(np.pad(A, ((0, A.shape[1]), (0, 0))), full_matrices=False)
+    return np.asarray(right[values <= limit], np.float64)
+
+
 def dependent_motion(points: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
     """Express the displacements of a rigid body by as few of them as determine the others.
 

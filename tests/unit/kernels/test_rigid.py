@@ -8,7 +8,7 @@ from gibiane_ops.kernels import assembly, elasticity
 from gibiane_ops.kernels.bars import bar_stiffness
 from gibiane_ops.kernels.elements.table import shape
 from gibiane_ops.kernels.materials import isotropic
-from gibiane_ops.kernels.rigid import FreeMotion, dependent_motion, free_motions, rigid_modes
+from gibiane_ops.kernels.rigid import FreeMotion, dependent_motion, free_motions, rigid_modes, unseen
 
 CUBE = (shape("CUB8").ref_nodes + 1) / 2
 BOTTOM, TOP = [0, 1, 2, 3], [4, 5, 6, 7]
@@ -182,3 +182,14 @@ def test_the_rotation_of_a_bar_about_itself_moves_nothing() -> None:
     assert free_motions(K, points, rows(9, *held([0, 1, 2], "yz"), *held([0], "x"))) == []
     (slide,) = free_motions(K, points, rows(9, *held([0, 1, 2], "yz")))
     assert str(slide) == "solid 0: translation along x"
+
+
+def test_unseen_combinations_are_those_the_rows_do_not_see() -> None:
+    rng = np.random.default_rng(3)
+    directions = np.linalg.qr(rng.normal(size=(6, 6)))[0]
+    for n, known in ((4000, 4), (5, 4), (2, 2), (0, 0)):
+        A = rng.normal(size=(n, known)) @ directions[:known]
+        found = unseen(A, 1e-9)
+        assert found.shape == (6 - known, 6)
+        assert found @ found.T == pytest.approx(np.eye(6 - known), abs=1e-12)
+        assert np.abs(A @ found.T).max(initial=0.0) < 1e-12

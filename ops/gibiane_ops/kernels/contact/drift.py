@@ -6,6 +6,7 @@ import numpy as np
 
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.interface import Interface
+from gibiane_ops.kernels.rigid import unseen
 
 
 def without_drift(w: FloatArray, interface: Interface) -> FloatArray:
@@ -24,7 +25,5 @@ def without_drift(w: FloatArray, interface: Interface) -> FloatArray:
     if R.shape[1] == 0:
         return w
     # motions along the surface only: those that change a gap are settled by the normal forces
-    _, values, Vt = np.linalg.svd(R[:: w.shape[1]], full_matrices=True)
-    still = np.r_[values, np.zeros(len(Vt) - len(values))] <= 1e-9
-    D = R @ Vt[still].T
+    D = R @ unseen(R[:: w.shape[1]], 1e-9).T
     return np.asarray(w - (D @ (D.T @ w.ravel())).reshape(w.shape))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from gibiane_ops.kernels.arrays import FloatArray
 from gibiane_ops.kernels.contact.interface import FREE_LIMIT
 from gibiane_ops.kernels.contact.pairs import ContactPairs
+from gibiane_ops.kernels.rigid import unseen
 
 BoolArray = NDArray[np.bool_]
 
@@ -35,9 +36,7 @@ def rigid_candidates(contact: ContactPairs, frames: FloatArray, active: BoolArra
     # keep the combinations that leave blocked components at rest
     blocked = candidates[~active.ravel()]
     if len(blocked):
-        _, values, Vt = np.linalg.svd(blocked, full_matrices=True)
-        at_rest = np.r_[values, np.zeros(len(Vt) - len(values))] <= FREE_LIMIT
-        candidates = _orthonormal(candidates @ Vt[at_rest].T)
+        candidates = _orthonormal(candidates @ unseen(blocked, FREE_LIMIT).T)
     return candidates
 
 

@@ -16,6 +16,7 @@ from gibiane_ops.kernels.contact.interface import Interface
 from gibiane_ops.kernels.contact.law import Friction
 from gibiane_ops.kernels.contact.report import OPEN, SLIP, STICK, ContactState, check_state
 from gibiane_ops.kernels.errors import NotConverged, StatusCycle
+from gibiane_ops.kernels.rigid import unseen
 
 BoolArray = NDArray[np.bool_]
 
@@ -157,9 +158,7 @@ class _NormalContact:
         R = self.interface.rigid
         if R.shape[1] == 0:
             return R[free]
-        _, values, Vt = np.linalg.svd(R[~free], full_matrices=True)
-        still = np.r_[values, np.zeros(R.shape[1] - len(values))] <= 1e-9
-        return np.asarray(R[free] @ Vt[still].T)
+        return np.asarray(R[free] @ unseen(R[~free], 1e-9).T)
 
 
 def _cut(tied: FloatArray, normal: FloatArray, law: Friction, closed: BoolArray) -> FloatArray:

@@ -12,6 +12,7 @@ from gibiane_ops.kernels.arrays import FloatArray, IntArray
 from gibiane_ops.kernels.estimate.macro import moments
 from gibiane_ops.kernels.estimate.simplices import Simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
+from gibiane_ops.kernels.rigid import unseen
 
 BoolArray = NDArray[np.bool_]
 
@@ -54,10 +55,9 @@ def loose_motions(points: FloatArray, cells: Sequence[IntArray], held: FloatArra
         mine = np.flatnonzero(body == each)
         basis = _rigid(points[mine])
         stopped = np.einsum("nij,qnj->niq", held[mine], basis).reshape(-1, len(basis))
-        _, size, right = np.linalg.svd(stopped, full_matrices=True)
-        size = np.append(size, np.zeros(len(basis) - len(size)))
-        motions = np.zeros((int((size <= NONE).sum()), n, dim))
-        motions[:, mine] = np.einsum("pq,qni->pni", right[size <= NONE], basis)
+        free = unseen(stopped, NONE)
+        motions = np.zeros((len(free), n, dim))
+        motions[:, mine] = np.einsum("pq,qni->pni", free, basis)
         largest = np.abs(motions).max(axis=(1, 2), initial=np.finfo(float).tiny)
         found.append(motions / largest[:, None, None])
     return np.concatenate(found)
