@@ -132,8 +132,10 @@ def test_jump_across_a_side(kinds, degree, axis):
     cells = {"QUA4": ([0, 1, 2, 3], [5, 2, 1, 4]), "QUA8": ([0, 1, 2, 3, 6, 7, 8, 9], [5, 2, 1, 4, 12, 7, 10, 11])}
     blocks = []
     for i, name in enumerate(kinds):
-        values = lambda x, i=i: np.stack([i * (x[..., 1] - 1)] + [0 * x[..., 1]] * 3, axis=-1)  # noqa: E731
-        blocks.append(sampled(name, points, np.array([cells[name][i]]), values))
+        block = sampled(
+            name, points, np.array([cells[name][i]]), lambda x: np.stack([x[..., 1] - 1] + [0 * x[..., 1]] * 3, axis=-1)
+        )
+        blocks.append(StressBlock(block.shape, block.cells, i * block.stress))
     if kinds[0] == kinds[1]:
         cells, values = (np.concatenate(each) for each in zip(*[(b.cells, b.stress) for b in blocks], strict=True))
         blocks = [StressBlock(blocks[0].shape, cells, values)]

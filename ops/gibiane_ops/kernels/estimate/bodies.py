@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from gibiane_ops.kernels.arrays import FloatArray, IntArray
+from gibiane_ops.kernels.connectivity import solids
 from gibiane_ops.kernels.estimate.macro import moments
 from gibiane_ops.kernels.estimate.simplices import Simplices
 from gibiane_ops.kernels.estimate.tractions import Exterior
@@ -41,17 +41,10 @@ def loose_motions(points: FloatArray, cells: Sequence[IntArray], held: FloatArra
     ----
     A search of connected components, one singular value decomposition of 3 or 6 columns for each body.
     """
-    from scipy.sparse.csgraph import connected_components
-
     n, dim = points.shape
-    ends = [np.stack([np.repeat(c[:, :1], c.shape[1] - 1, axis=1).ravel(), c[:, 1:].ravel()]) for c in cells]
-    rows, columns = np.concatenate(ends, axis=1) if ends else np.zeros((2, 0), np.int64)
-    links = sp.csr_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
-    _, body = connected_components(links, directed=False)
-    used = np.zeros(n, bool)
-    used[rows], used[columns] = True, True
+    n_bodies, body = solids([("any shape", each) for each in cells], n)
     found = [np.zeros((0, n, dim))]
-    for each in np.unique(body[used]):
+    for each in range(n_bodies):
         mine = np.flatnonzero(body == each)
         basis = _rigid(points[mine])
         stopped = np.einsum("nij,qnj->niq", held[mine], basis).reshape(-1, len(basis))
