@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from gibiane.binding import Operands
 from gibiane.forms import Arg, Key
 from gibiane.registry import Context, Refused, extend
-from gibiane.values import CHPOINT, FLOTTANT, MCHAML, MMODEL, type_of
+from gibiane.values import CHPOINT, ENTIER, FLOTTANT, MCHAML, MMODEL, type_of
 from gibiane_ops.kernels.estimate.combine import combine
 from gibiane_ops.kernels.estimate.contact import contact_error
 from gibiane_ops.kernels.estimate.zz import solid_error
@@ -41,6 +41,9 @@ from gibiane_ops.values.nodes import FloatArray, node_store
 from gibiane_ops.values.smoothed import METHODS, Solid, smoothed
 
 ERRE = extend("ERREUR")
+
+SMOOTHINGS = ("SPRE", "PLEI", "JOIN")
+"""Smoothings of LISSER that are no keywords here, by their first letters."""
 MIXTURE = 2.0
 """Ratio of stiffnesses in one solid above which a note tells that smoothing mixes them."""
 
@@ -209,10 +212,44 @@ def _incomplete(ctx: Context, q: Operands) -> Any:
         CHPOINT: "the displacement U or the contact forces REA",
     }
     if missing is None:
-        ctx.fail(7, "a keyword is not understood; INFO ERREUR lists them")
+        _misread(ctx, q)
     ctx.fail(
         37,
         "the indicator lacks {what}",
         what=names[missing],
         hint="X CH = ERREUR MODL SIG MAT ; XS XC XG CARTE = ERREUR 'CONTACT' MODL SIG MAT MC MATC U REA",
     )
+
+
+def _misread(ctx: Context, q: Operands) -> NoReturn:
+    """Tell the first keyword that no form has, or that what it takes does not follow."""
+    keys = [key for form in ctx.operator.forms for key in form.keys]
+    for i, word in enumerate(q.values):
+        if not isinstance(word, str):
+            continue
+        mine = [key for key in keys if key.match(word)]
+        rest = Operands(q.session, q.source, q.values[i:], q.nodes[i:])
+        if not mine and word[:4] in SMOOTHINGS:
+            ctx.fail(
+                7,
+                "'{word}' is a smoothing of LISSER, whose result is given here",
+                word=word,
+                hint="X CH = ERREUR MODL SIG MAT (LISSER 'SPRE' MODL SIG ...)",
+            )
+        if not mine:
+            raise rest.unknown_keyword(sorted({each for key in keys for each in key.words}))
+        takes = [key.args[0] for key in mine if key.args]
+        after = type_of(q.values[i + 1]) if i + 1 < len(q) else None
+        kinds = {kind for arg in takes for kind in arg.types}
+        if len(takes) == len(mine) and after not in kinds and not (after == ENTIER and FLOTTANT in kinds):
+            ctx.fail(
+                7,
+                "after '{word}' comes {wanted}, not {found}"
+                if after
+                else "after '{word}' comes {wanted}: it is missing",
+                word=word,
+                wanted="|".join(sorted(kinds)),
+                found=after,
+                hint="INFO ERREUR tells what each keyword takes",
+            )
+    ctx.fail(7, "these keywords do not go together", hint="INFO ERREUR shows the forms")
