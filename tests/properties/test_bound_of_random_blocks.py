@@ -7,13 +7,17 @@ the squared bound is not below ``J(u_h) - J(u)`` (the gap between the primal and
 import pytest
 from random_blocks import Blocks
 
-FEW, MANY = range(12), range(12, 250)
+CYCLE = 106
+"""Corners pushed back to the law that are once more than the balance of the stress leaves free."""
+
+FEW = [*range(12), CYCLE]
+MANY = [seed for seed in range(250) if seed not in FEW]
 
 
 @pytest.mark.parametrize("seed", [*FEW, *(pytest.param(seed, marks=pytest.mark.slow) for seed in MANY)])
 def test_bound_is_above_the_gap_of_the_potential(seed):
     blocks = Blocks(seed)
-    found, fine = blocks.solve(0), blocks.solve(1 if seed in FEW else 2)
+    found, fine = blocks.solve(0), blocks.solve(1 if seed in FEW[:12] else 2)
     if found is None or fine is None:
         # loads drawn at random may turn a block over, or push it away
         assert "error[G40" in blocks.out.getvalue() or "error[1119]" in blocks.out.getvalue()
