@@ -102,8 +102,8 @@ def improve(target: Target, tau: FloatArray, cells: IntArray) -> None:
     costs less than a sweep of some thousand tetrahedra. The rigid balances of the cells are constraints,
     by an augmented Lagrangian. Tractions that leave the law of contact are pushed back by stiff springs, as long as
     they push (semi-smooth Newton); where friction is at its bound g the multiplier p of ``|R_t| <= g`` also resists
-    turning, with p / g. What they leave is cut from the
-    change, and of the changes tried the best that keeps the balance is taken.
+    turning, with p / g. What they leave is cut from
+    the last change that keeps the balance.
 
     Source
     ------
@@ -209,16 +209,8 @@ def _within(
     k, size = len(system.weight), len(x)
     pushing, before = np.zeros((n, 2, dim), bool), np.zeros((n, 2, dim), bool)
     force = np.zeros((n, 2, dim))
-    best, least = np.zeros(size), 0.0
-    for turn in range(SETS + 1):
-        # corners that cycle may be more than the balance leaves free: only what meets it counts
-        if np.abs(system.rows @ x + system.offset).max(initial=0.0) <= MET * system.scale:
-            y = x * float(limits.step(tau, x.reshape(tau.shape), sides).min(initial=1.0))
-            gain = float(y @ (system.A @ y)) / 2 - float(system.descent @ y)
-            if gain < least:
-                best, least = y, gain
-        if turn == SETS:
-            break
+    balanced = x
+    for turn in range(SETS):
         ahead = tau + x.reshape(tau.shape)
         found = limits.passed(ahead, sides, pushing)
         reach = np.einsum("sij,si,sj->s", system.free[found[0]], found[3], found[3])
@@ -250,4 +242,7 @@ def _within(
         force = np.zeros_like(force)
         force[row, kind, corner] = multipliers[k:]
         pushing = force > 0
-    return best
+        # corners that cycle may be more than the balance leaves free
+        if np.abs(system.rows @ x + system.offset).max(initial=0.0) <= MET * system.scale:
+            balanced = x
+    return balanced * float(limits.step(tau, balanced.reshape(tau.shape), sides).min(initial=1.0))
